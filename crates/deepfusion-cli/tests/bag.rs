@@ -391,7 +391,7 @@ fn a_damaged_bag_does_not_hide_the_others() {
     for part in [
         "sim: 1 of 2 recordings cannot be read",
         "hint: each is listed with its reason",
-        "keeps its own ending",
+        "name ROS 2 recordings .mcap or .db3",
         "or give the others by themselves",
     ] {
         assert!(listed.stderr.contains(part), "{part}: {}", listed.stderr);
@@ -448,7 +448,10 @@ fn of_bags_that_cannot_be_read_the_reasons_are_said() {
     fails(
         at,
         "data inspect sim",
-        &["a.bag: not a ROS bag", "keeps its own ending"],
+        &[
+            "a.bag: not a ROS bag",
+            "name ROS 2 recordings .mcap or .db3",
+        ],
     );
 }
 

@@ -53,7 +53,10 @@ fn every_check_has_a_line_that_says_whether_it_was_made() {
         line("lidar-speed").contains("not checked: no LiDAR"),
         "{text}"
     );
-    assert!(line("stereo").contains("not checked: one camera"), "{text}");
+    assert!(
+        line("stereo").contains("not checked: the recording has one camera"),
+        "{text}"
+    );
 
     let report = run(at, "doctor sim --json --report page.html").stdout;
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
@@ -291,7 +294,7 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
     };
     let import = "deepfusion data import";
     says("phone.gpx", "log", "GPX track with 13 speeds", import);
-    says("phone.gpx", "log-sure", "expect distances", "--dbc FILE");
+    says("phone.gpx", "log-sure", "are accurate to", "--dbc FILE");
     says(
         "phone.gpx",
         "log-turns",
@@ -305,8 +308,8 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
         "--clock-offset auto",
     );
     says("torque.csv", "log", "speed from column", import);
-    says("torque.csv", "log-clock", "without a zone", "--zone");
-    says("phyphox.csv", "log-clock", "no dates", "--start");
+    says("torque.csv", "log-clock", "without a time zone", "--zone");
+    says("phyphox.csv", "log-clock", "are not dates", "--start");
     says("sensor_logger", "log", "301 yaw rates", import);
     for trace in ["candump.log", "vector.asc", "vector.blf"] {
         says(
@@ -315,7 +318,12 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
             "CAN trace with 121 speeds",
             import,
         );
-        says(trace, "opening", "a DBC file does", "--dbc FILE");
+        says(
+            trace,
+            "opening",
+            "a DBC file that describes its frames is needed",
+            "--dbc FILE",
+        );
     }
     says(
         "german.csv",

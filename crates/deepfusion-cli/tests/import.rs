@@ -114,7 +114,7 @@ fn a_log_beside_its_images_is_a_drive() {
     fails(
         at,
         "data import torque.csv --images images --out x",
-        &["nothing says the unit", "Speed (OBD)"],
+        &["the unit of the speed", "Speed (OBD)"],
     );
     fails(
         at,

@@ -294,7 +294,7 @@ fn what_cannot_be_opened_is_an_error() {
     for command in ["perceive", "predict"] {
         let args = format!("{command} --model run tcp://me:secret@{nobody} --out c");
         let run = run(at, &args);
-        refused(&run, &["gave no frame", "is the source running"]);
+        refused(&run, &["gave no frame", "check that the source is running"]);
         assert!(!run.stderr.contains("secret"), "{}", run.stderr);
         assert_eq!(files(&at.join("c")), Vec::<String>::new());
     }

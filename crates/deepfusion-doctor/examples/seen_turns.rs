@@ -1,4 +1,4 @@
-//! How well the images of a drive tell its turns, against sensors that know them:
+//! How well the images of a drive show its turns, compared with sensors that measure them:
 //! `cargo run --release -p deepfusion-doctor --example seen_turns -- DRIVE…`
 
 use deepfusion_data::{Dataset, Ego, OpenOptions, Result, SeenTurn};
@@ -16,7 +16,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Means and standard deviations of the sensors' turns from image to image, and of what the images say beyond them, in degrees.
+/// Means and standard deviations of the sensors' turns from image to image, and of the images' turns less the sensors', in degrees.
 fn print_errors(ego: &Ego<'_>, turns: &[SeenTurn]) {
     let known = |turn: &SeenTurn| {
         let motion = ego.vehicle_motion(turn.from_s, turn.to_s)?;

@@ -1,4 +1,4 @@
-//! The checks that training makes by itself: they take a second or so of a drive, and what they find makes it senseless.
+//! The checks that training makes by itself. They take about a second a drive, and what they find would make training pointless.
 
 use super::finding::{Finding, Outcome, Severity};
 use super::reason::{FindingReason, MotionReason};
@@ -9,7 +9,7 @@ use deepfusion_data::{DataWarning, Dataset, Ego, Frame, MotionWarning};
 /// Frames and pairs that are read.
 const SURVEY: (usize, usize) = (120, 60);
 
-/// The worst of what is wrong with the numbers of a drive's camera, for images of its size; nothing of a camera that is
+/// The worst finding about a drive's intrinsics, for images of its size; none about a camera that is
 /// [assumed](Dataset::camera_assumed). No image is read.
 #[must_use]
 pub fn camera_finding(dataset: &Dataset) -> Option<Finding> {
@@ -19,8 +19,8 @@ pub fn camera_finding(dataset: &Dataset) -> Option<Finding> {
     worst(intrinsics::check(&dataset.intrinsics(0)))
 }
 
-/// What makes a drive's turns senseless to train with: its images turn the other way, or by another angle than its focal length makes of them.
-/// Reads up to 120 images, and none where no yaw rate was measured or the vehicle hardly turns.
+/// What makes it pointless to train on a drive's turns: its images turn the other way, or by another angle than its focal length gives.
+/// Reads up to 120 images, and none if no yaw rate was measured or the vehicle hardly turns.
 #[must_use]
 pub fn turn_finding(dataset: &Dataset) -> Option<Finding> {
     if !turns_measured(dataset) || turn::spread(&yaw_rates(dataset)) < turn::LEAST_TURN {
@@ -36,7 +36,7 @@ pub fn turn_finding(dataset: &Dataset) -> Option<Finding> {
     (finding.severity == Severity::Error && !known_to_be_off).then_some(finding)
 }
 
-/// Whether a sensor knows the turns: those of the images agree with the images.
+/// Whether a sensor measured the turns. Turns that were taken from the images always agree with them.
 fn turns_measured(dataset: &Dataset) -> bool {
     let of_images = |warning: &DataWarning| {
         matches!(

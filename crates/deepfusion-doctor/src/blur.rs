@@ -1,4 +1,4 @@
-//! Blurred frames: single ones against the drive's usual sharpness, and a whole drive out of focus.
+//! Blurred frames: single ones compared with the drive's usual sharpness, and a whole drive out of focus.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::PicturesReason;
@@ -9,7 +9,7 @@ use super::survey::Survey;
 const BLURRED: f64 = 0.5;
 /// Share of blurred frames, percent.
 const MOST: f64 = 5.0;
-/// Sharpness of a drive in focus: variance of the Laplacian over that at half the size.
+/// Sharpness of a drive in focus: variance of the Laplacian over that at half the image's size.
 const LEAST: f64 = 0.06;
 
 pub(super) fn check(survey: &Survey<'_>) -> Outcome {

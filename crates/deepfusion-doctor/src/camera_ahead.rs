@@ -1,4 +1,4 @@
-//! The offset of the camera's clock, to be applied: as the check `clock` measures it, but an error where it is not sure.
+//! The offset of the camera's clock, to be applied. Measured like the check `clock`, but an error if it is not certain enough.
 
 use super::clock_offset::{rates, settled};
 use super::epipolar;
@@ -8,19 +8,19 @@ use deepfusion_hint::Hint;
 use deepfusion_motion::{NoTimeOffset, OffsetConfig, TimeOffset};
 use std::fmt;
 
-/// Largest standard error of an offset that is applied, in seconds: at 3 m/s² of braking it is 0.15 m/s.
+/// Largest standard error of an offset that is applied, in seconds. At 3 m/s² of braking it makes 0.15 m/s.
 pub const MOST_STD_ERROR_S: f64 = 0.05;
-/// The same where only a receiver's course shows the turns: smoothing spreads them, and what resampling says of it is too little.
+/// The same if only a receiver's course shows the turns. Smoothing spreads them, so resampling gives too small a standard error.
 pub const MOST_TRACK_STD_ERROR_S: f64 = 0.035;
 /// Least correlation of the picture's motion with the vehicle's.
 pub const LEAST_CORRELATION: f64 = 0.3;
-/// How far the clocks may be apart, in seconds: first near, then wide, where more offsets fit by chance.
+/// How far apart the clocks may be, in seconds: the near range is tried first. In the wide one, more offsets fit by chance.
 const SEARCH_S: [f64; 2] = [1.0, 4.0];
-/// How many times as many pictures are read where only a receiver's course shows the turns.
+/// How many times as many pictures are read if only a receiver's course shows the turns.
 const TRACK_SURVEY: usize = 3;
-/// What is slower than this is taken out of the turns of a course, in seconds: smoothing has taken what is faster than two.
+/// Variations of a course's turns that are slower than this are removed, in seconds. Smoothing has removed those faster than two.
 const TRACK_TREND_S: f64 = 15.0;
-/// Drives of one recording agree where they differ by so many standard errors, or so many seconds, at most.
+/// Drives of one recording agree if they differ by at most this many standard errors, or this many seconds.
 const SIGMAS: f64 = 4.0;
 const AGREE_S: f64 = 0.02;
 
@@ -36,7 +36,7 @@ pub struct CameraAhead {
 }
 
 impl CameraAhead {
-    /// How far an independent measurement is away, as a share of what is allowed: above 1 they contradict each other.
+    /// How far away an independent measurement is, as a share of what is allowed: above 1 they contradict each other.
     fn apart(&self, other: &Self) -> f64 {
         let error_s = self.std_error_s.hypot(other.std_error_s);
         (self.ahead_s - other.ahead_s).abs() / (SIGMAS * error_s).max(AGREE_S)
@@ -47,66 +47,66 @@ impl CameraAhead {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum NoCameraAhead {
-    /// Nothing was recorded to compare the pictures with.
+    /// There are no speeds or times to compare the pictures with.
     NoSpeeds {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
     },
-    /// The pictures do not follow the vehicle.
+    /// The picture's motion does not match the vehicle's.
     NotFound {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
-        /// Why not.
+        /// Why they do not match.
         source: NoTimeOffset,
     },
-    /// The pictures follow the vehicle too loosely.
+    /// The picture's motion matches the vehicle's too loosely.
     Weak {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
         /// Best offset, in seconds.
         ahead_s: f64,
-        /// The correlation there.
+        /// The correlation at that offset.
         correlation: f64,
     },
-    /// The offset is not known well enough.
+    /// The standard error of the offset is too large.
     Unsure {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
         /// The offset, in seconds.
         ahead_s: f64,
         /// Its standard error, in seconds.
         std_error_s: f64,
-        /// The largest that is applied.
+        /// The largest standard error with which an offset is applied, in seconds.
         most_s: f64,
     },
-    /// A drive whose clocks are not as far apart as those of the others.
+    /// The offset of this drive differs from that of the others.
     Differ {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
         /// Its offset, in seconds.
         ahead_s: f64,
         /// Its standard error, in seconds.
         std_error_s: f64,
-        /// The mean of the others, in seconds.
+        /// Mean offset of the others, in seconds.
         others_s: f64,
         /// Its standard error, in seconds.
         others_error_s: f64,
     },
-    /// A drive that does not show its offset, and says another one than the others show.
+    /// The pictures of this drive do not show its offset, and its file gives another one than the others show.
     SaysOther {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
-        /// What it says, in seconds.
+        /// The offset that its file gives, in seconds.
         said_s: f64,
-        /// The mean of the others, in seconds.
+        /// Mean offset of the others, in seconds.
         others_s: f64,
     },
-    /// No drive.
+    /// No drive was given.
     Nothing,
 }
 
 impl NoCameraAhead {
-    /// The drive it is about; none where there is no drive.
+    /// The drive it is about; `None` if no drive was given.
     #[must_use]
     pub fn drive(&self) -> Option<&str> {
         match self {
@@ -125,7 +125,8 @@ impl NoCameraAhead {
     pub fn reason(&self) -> String {
         match self {
             Self::NoSpeeds { .. } => {
-                "the clocks cannot be compared: it has no speeds, or its frames no times".into()
+                "the clocks cannot be compared: there are no speeds, or the frames have no times"
+                    .into()
             }
             Self::NotFound { source, .. } => source.to_string(),
             Self::Weak {
@@ -133,7 +134,7 @@ impl NoCameraAhead {
                 correlation,
                 ..
             } => format!(
-                "the pictures follow the vehicle best {ahead_s:+.2} s off, with a correlation of {correlation:.2}; at least {LEAST_CORRELATION} is \
+                "the pictures match the vehicle's motion best at an offset of {ahead_s:+.2} s, with a correlation of {correlation:.2}; at least {LEAST_CORRELATION} is \
                  needed"
             ),
             Self::Unsure {
@@ -156,9 +157,9 @@ impl NoCameraAhead {
             Self::SaysOther {
                 said_s, others_s, ..
             } => format!(
-                "it says that its camera's clock is {said_s:+.3} s ahead, which its pictures do not show; those of the other drives show {others_s:+.3} s"
+                "its file gives a clock offset of {said_s:+.3} s, which its pictures do not show; those of the other drives show {others_s:+.3} s"
             ),
-            Self::Nothing => "no recording to compare clocks of".into(),
+            Self::Nothing => "no recording was given to compare the clocks of".into(),
         }
     }
 }
@@ -194,21 +195,21 @@ impl Hint for NoCameraAhead {
                 "use a longer drive with more bends, or a log with a gyroscope; or give the offset in milliseconds".into()
             }
             Self::SaysOther { .. } => {
-                "take clock.camera_ahead_s out of the file beside it where it is wrong; else give the recordings one by one".into()
+                "if clock.camera_ahead_s in the file beside it is wrong, remove it; otherwise give the recordings one by one".into()
             }
             Self::Differ { .. } => {
-                "write clock.camera_ahead_s beside each recording (dataset.toml), or give them one by one".into()
+                "set clock.camera_ahead_s beside each recording (dataset.toml), or give them one by one".into()
             }
             Self::Nothing => "name a recording".into(),
         })
     }
 }
 
-/// Measures how far the camera's clock is ahead of the vehicle's: by the turns of an inertial unit or a yaw rate, else of a receiver's
-/// course, and by changes of speed. A few hundred pictures are read.
+/// Measures how far the camera's clock is ahead of the vehicle's, from the turns of an inertial unit or a yaw rate, else of a receiver's
+/// course, and from changes of speed. A few hundred pictures are read.
 ///
 /// # Errors
-/// Why it is not known well enough to be applied.
+/// If the offset is not known well enough to be applied; the error says why.
 pub fn camera_ahead(dataset: &Dataset) -> Result<CameraAhead, NoCameraAhead> {
     let offset = offset(dataset)?;
     Ok(CameraAhead {
@@ -218,7 +219,7 @@ pub fn camera_ahead(dataset: &Dataset) -> Result<CameraAhead, NoCameraAhead> {
     })
 }
 
-/// The offset that [`camera_ahead`] applies, against what the recording says itself.
+/// The offset that [`camera_ahead`] applies, relative to the one that the recording gives itself.
 pub(super) fn offset(dataset: &Dataset) -> Result<TimeOffset, NoCameraAhead> {
     let drive = || dataset.name().to_owned();
     let turning = dataset.turning_as_its_course();
@@ -228,7 +229,7 @@ pub(super) fn offset(dataset: &Dataset) -> Result<TimeOffset, NoCameraAhead> {
     let rates = rates(dataset)
         .filter(|_| timed)
         .ok_or_else(|| NoCameraAhead::NoSpeeds { drive: drive() })?;
-    // The turns of a course are spread over time: it takes more of them.
+    // The turns of a course are spread over time, so more of them are needed.
     let survey = if by_course {
         Survey::times(dataset, TRACK_SURVEY)
     } else {
@@ -281,7 +282,7 @@ pub(super) fn offset(dataset: &Dataset) -> Result<TimeOffset, NoCameraAhead> {
     Ok(offset)
 }
 
-/// The best of the correlations.
+/// The highest of the correlations.
 fn correlation(offset: &TimeOffset) -> f64 {
     let all = [
         offset.yaw_correlation,
@@ -292,19 +293,19 @@ fn correlation(offset: &TimeOffset) -> f64 {
     all.into_iter().flatten().fold(0.0, f64::max)
 }
 
-/// What drives that were recorded by one setup show together.
+/// The offset that drives recorded with one setup show together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommonCameraAhead {
     /// The mean, weighted by the inverse squares of the standard errors.
     pub ahead: CameraAhead,
-    /// Why drives do not show it themselves: they get the mean of the others.
+    /// Drives that do not show it themselves, with the reason; they get the mean of the others.
     pub unmeasured: Vec<NoCameraAhead>,
 }
 
-/// [`camera_ahead`] of drives that were recorded by one setup. Of two cameras on one clock, the first is looked at.
+/// [`camera_ahead`] of drives recorded with one setup. Of two cameras on one clock, only the first is used.
 ///
 /// # Errors
-/// As [`camera_ahead`], where no drive shows it; [`NoCameraAhead::Differ`] and [`NoCameraAhead::SaysOther`] where a drive contradicts the
+/// As [`camera_ahead`], if no drive shows it; [`NoCameraAhead::Differ`] and [`NoCameraAhead::SaysOther`] if a drive contradicts the
 /// others.
 pub fn common_camera_ahead<'a>(
     datasets: impl IntoIterator<Item = &'a Dataset>,
@@ -359,7 +360,7 @@ pub fn common_camera_ahead<'a>(
     })
 }
 
-/// The measurement that contradicts the mean of the others most, and that mean.
+/// The measurement that contradicts the mean of the others most, with that mean.
 fn outlier(all: &[CameraAhead]) -> Option<(usize, CameraAhead)> {
     let apart = |i: usize| {
         let others = weighted_mean(&[&all[..i], &all[i + 1..]].concat())?;
@@ -373,7 +374,7 @@ fn outlier(all: &[CameraAhead]) -> Option<(usize, CameraAhead)> {
         .map(|(_, i, others)| (i, others))
 }
 
-/// `None` of none.
+/// `None` for an empty slice.
 fn weighted_mean(all: &[CameraAhead]) -> Option<CameraAhead> {
     let weight = |ahead: &CameraAhead| ahead.std_error_s.max(1e-3).powi(-2);
     let sum: f64 = all.iter().map(weight).sum();

@@ -1,4 +1,4 @@
-//! The camera's clock against the vehicle's.
+//! The camera's clock compared with the vehicle's.
 
 use super::camera_ahead;
 use super::clock_offset::{rates, settled};
@@ -11,9 +11,9 @@ use deepfusion_motion::{OffsetConfig, Signal, TimeOffset};
 
 /// Offset that matters, in seconds: at 10 m/s² of braking 20 ms are 0.2 m/s.
 const MOST_S: f64 = 0.020;
-/// The same where positions alone show the turns: a receiver's own delay is of that size.
+/// The same if positions alone show the turns: a receiver's own delay is of that size.
 const MOST_BY_COURSE_S: f64 = 0.1;
-/// An estimate counts where it is so many standard errors from 0, and these are below `SURE_S`.
+/// An estimate counts if it is at least this many standard errors from 0, and these are below `SURE_S`.
 const SIGMAS: f64 = 4.0;
 const SURE_S: f64 = 0.05;
 
@@ -24,7 +24,7 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     };
     let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
     let mut outcome = Outcome::new("clock");
-    // What the estimate cannot tell from 0 holds.
+    // An offset that cannot be distinguished from 0 passes.
     let limit = least_s.max(SIGMAS * error);
     let figure = Figure::new(
         "offset, vehicle less camera",
@@ -40,10 +40,10 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     outcome
 }
 
-/// An offset that is sure enough.
+/// An offset that is certain enough.
 pub(super) struct Estimate {
     pub(super) offset: TimeOffset,
-    /// What is smaller does not count, in seconds.
+    /// Smaller offsets do not count, in seconds.
     least_s: f64,
 }
 
@@ -52,7 +52,7 @@ pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Es
     let rates = rates(survey.dataset).filter(|rates| rates.yaw_rate_radps.is_some());
     let rates = rates.ok_or(ClockSkip::NoRates)?;
     if !survey.dataset.yaw_known() {
-        // A course takes more pictures and other settings than a yaw rate.
+        // A course needs more pictures and other settings than a yaw rate.
         let offset = camera_ahead::offset(survey.dataset).map_err(ClockSkip::ByCourse)?;
         let least_s = MOST_BY_COURSE_S;
         return Ok(Estimate { offset, least_s });
@@ -65,7 +65,7 @@ pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Es
             std_error_s,
         })
     } else {
-        // A stream is not placed better than its own interval (KITTI's oxts, at 10 Hz, come out 60 ms late).
+        // A stream's times are known no better than to its own interval (KITTI's oxts, at 10 Hz, come out 60 ms late).
         let interval_s = rates.speed_mps.as_ref().and_then(Signal::interval_s);
         let least_s = MOST_S.max(interval_s.unwrap_or(0.0));
         Ok(Estimate { offset, least_s })

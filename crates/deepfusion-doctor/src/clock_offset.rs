@@ -1,4 +1,4 @@
-//! The offset between the camera's clock and the vehicle's, by how pictures and vehicle turn.
+//! The offset between the camera's clock and the vehicle's, from how pictures and vehicle turn.
 
 use super::epipolar::EpipolarPair;
 use super::survey::Survey;
@@ -9,12 +9,12 @@ use deepfusion_motion::{
 };
 use rayon::prelude::*;
 
-/// How often the offset is measured again with what it says, at most, and by how little it then changes, seconds.
+/// The offset is measured again with its own result at most this often, or until it changes by less than this, in seconds.
 const ROUNDS: usize = 4;
 /// See [`ROUNDS`].
 const SETTLED_S: f64 = 0.001;
 
-/// What the vehicle measured of its motion: without a yaw rate the turns of its course, where a receiver shows them. `None` without
+/// What the vehicle measured of its motion; without a yaw rate, the turns of its course if a receiver recorded one. `None` without
 /// speeds.
 pub(super) fn rates(dataset: &Dataset) -> Option<VehicleRates> {
     let mut rates = VehicleRates::from(dataset.track()?);
@@ -24,9 +24,9 @@ pub(super) fn rates(dataset: &Dataset) -> Option<VehicleRates> {
     Some(rates)
 }
 
-/// The offset, and with it which way the camera headed: that is taken from the vehicle, whose times are known once the offset
-/// is. Taken at another time it adds a part of that time's turn to the picture's, and a tenth to the offset. By how much it
-/// still changes in the end is in the standard error.
+/// Finds the offset, and with it the camera's direction of travel. That direction is taken from the vehicle, whose times are
+/// known only once the offset is. Taken at another time it adds a part of that time's turn to the picture's, and a tenth to the
+/// offset. The last change of the offset is part of the standard error.
 pub(super) fn settled(
     survey: &Survey<'_>,
     pairs: &[EpipolarPair],
@@ -42,7 +42,7 @@ pub(super) fn settled(
         let before = offset.vehicle_minus_camera_s;
         let headed = |pair: &EpipolarPair| pair.with_clock(&ego, before);
         let again: Vec<EpipolarPair> = pairs.iter().filter_map(headed).collect();
-        // A track that ends too early for the offset leaves too few pairs: what was measured before holds.
+        // A track that ends too early for the offset leaves too few pairs: the earlier result is kept.
         let Ok(measured) = measure(&again) else { break };
         let change = (measured.vehicle_minus_camera_s - before).abs();
         offset = TimeOffset {
@@ -60,23 +60,23 @@ pub(super) fn settled(
     }
 }
 
-/// How far about a first estimate the better one is looked for, and in what steps, seconds.
+/// How far about a first estimate the better one is searched for, and in what steps, seconds.
 const AROUND_S: f64 = 0.06;
 /// See [`AROUND_S`].
 const STEP_S: f64 = 0.004;
-/// Pairs that are left out together for the standard error: half a second of them.
+/// Pairs that are left out together for the standard error: half a second's worth.
 const BLOCK: usize = 5;
 
-/// The offset at which the points agree best with the vehicle's turns about all three axes, where an inertial unit has them. A
-/// turn that is measured in the picture first is coupled to the others, and to what near things do; here none is measured.
-/// The first estimate where the best one lies at the end of what was looked at.
+/// The offset at which the points agree best with the vehicle's turns about all three axes, if an inertial unit measured them. A
+/// turn measured in the picture first would be coupled to the other axes, and to the motion of near things; here none is measured.
+/// Returns the first estimate if the best offset lies at the end of the range.
 fn refined(survey: &Survey<'_>, pairs: &[EpipolarPair], first: TimeOffset) -> TimeOffset {
     let Ok(ego) = survey.dataset.ego() else {
         return first;
     };
     let steps = (AROUND_S / STEP_S).round() as i32;
     let offset_s = |step: f64| first.vehicle_minus_camera_s + step * STEP_S;
-    // Costs of each pair that has a motion at every offset, by offset.
+    // Costs at each offset, of the pairs that have a motion at all offsets.
     let costs: Vec<Vec<f64>> = pairs
         .par_iter()
         .filter_map(|pair| {
@@ -114,7 +114,7 @@ fn refined(survey: &Survey<'_>, pairs: &[EpipolarPair], first: TimeOffset) -> Ti
     }
 }
 
-/// Where a parabola through the lowest value and its neighbours is least; `None` at an end.
+/// Where a parabola through the lowest value and its neighbours has its minimum; `None` at an end.
 fn lowest(values: &[f64]) -> Option<f64> {
     let at = (0..values.len()).min_by(|a, b| values[*a].total_cmp(&values[*b]))?;
     let (before, after) = (values.get(at.checked_sub(1)?)?, values.get(at + 1)?);
@@ -122,8 +122,8 @@ fn lowest(values: &[f64]) -> Option<f64> {
     Some(at as f64 + 0.5 * (before - after) / bend.max(1e-12))
 }
 
-/// How the pictures moved. The turn by the points that were followed is truer than shift, drop and roll of the whole picture,
-/// which near things move as well; it is taken where enough pairs have it.
+/// How the pictures moved. The turn from the followed points is more accurate than shift, drop and roll of the whole picture,
+/// which near things change as well; it is used if enough pairs have it.
 fn pictures(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Vec<ImageMotion> {
     let whole: Vec<ImageMotion> = survey.pairs.iter().filter_map(|p| p.image).collect();
     let turned = |pair: &EpipolarPair| {

@@ -13,11 +13,11 @@ pub struct DepthPicture {
     pub image: RgbImage,
 }
 
-/// The measured depth on the images that the diagnosis of a drive chose ([`crate::DrivePlots::with_depth`]); `path` and `options` as the
-/// recording was examined. What cannot be read is left out: it is among the findings.
+/// The measured depth on the images that the diagnosis of a drive chose ([`crate::DrivePlots::with_depth`]); `path` and `options` as
+/// given when the recording was examined. What cannot be read is left out: it is among the findings.
 ///
 /// # Errors
-/// Those of [`Dataset::open`], and depth of another size than its image.
+/// Those of [`Dataset::open`], and depth whose size differs from its image's.
 pub fn depth_pictures(
     path: &Path,
     options: &OpenOptions,

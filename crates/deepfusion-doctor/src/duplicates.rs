@@ -1,4 +1,4 @@
-//! Frames that are the frame before once more: their pair shows no motion where the vehicle has one, and teaches that
+//! Frames that repeat the frame before. Their pair shows no motion although the vehicle moved, and teaches that
 //! everything is far away.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
@@ -9,7 +9,7 @@ use deepfusion_data::Frame;
 
 /// The vehicle certainly moves above this, m/s.
 const MOVING_MPS: f64 = 1.0;
-/// Share of frames that may repeat the one before while the vehicle moves: none does in a whole recording.
+/// Share of frames that may repeat the one before while the vehicle moves: none does in an undamaged recording.
 const MOST: f64 = 0.0;
 
 pub(super) fn check(survey: &Survey<'_>) -> Outcome {
@@ -46,7 +46,7 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     outcome
 }
 
-/// Whether two files hold the same bytes. What cannot be read is found elsewhere.
+/// Whether two files hold the same bytes. Another check reports files that cannot be read.
 fn same_file(a: &Frame, b: &Frame) -> bool {
     let (a, b) = (a.image.path(), b.image.path());
     let length = |path: &std::path::Path| std::fs::metadata(path).map(|m| m.len()).ok();

@@ -1,4 +1,4 @@
-//! A topic of dynamic points against the radial velocities of its LiDAR.
+//! A topic of dynamic points compared with the radial velocities of its LiDAR.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::MotionReason;
@@ -7,11 +7,11 @@ use super::skip::MotionSkip;
 use deepfusion_data::Dataset;
 
 const CHECK: &str = "dynamic-points";
-/// Scans looked at.
+/// Number of scans examined.
 const MOST_SCANS: usize = 40;
-/// Fewer moving points, by either, tell no share.
+/// With fewer dynamic points, according to either source, there is no meaningful share.
 const LEAST_POINTS: usize = 200;
-/// The driver's threshold need not be ours: slow objects may be in one alone.
+/// The driver's threshold may differ from ours: slow objects may be in one source alone.
 const LEAST_SHARE: Limit = Limit::AtLeast(0.7);
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {
@@ -24,7 +24,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         let scans = agreement.scans;
         return Outcome::skipped(CHECK, MotionSkip::LittleDynamic { scans });
     }
-    // Where one says that nothing moves, it has none of what the other says.
+    // If one source says that nothing moves, it shares no points with the other.
     let share = |share: f64| if share.is_nan() { 0.0 } else { share };
     let (precision, recall) = (share(agreement.precision()), share(agreement.recall()));
     let mut outcome = Outcome::new(CHECK);

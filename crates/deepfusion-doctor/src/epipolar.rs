@@ -1,4 +1,4 @@
-//! How the camera turned, and where it headed, by the points it followed.
+//! How the camera turned, and in which direction it moved, from the points that were followed.
 //!
 //! A point seen at (x, y) = K⁻¹ pixel by a camera that moves by t and turns by ω (both small, in the camera's
 //! axes; `earlier_from_later` = (exp ω, t)) moves by
@@ -6,8 +6,8 @@
 //! (−t_x + x t_z, −t_y + y t_z) / Z + B(x, y) ω,  B = [[xy, −(1 + x²), y], [1 + y², −xy, −x]]
 //!
 //! (Longuet-Higgins and Prazdny 1980). Across its epipolar line, whose direction depends on t's direction
-//! alone, only the turn moves it: for a direction given, ω follows by linear least squares, and the
-//! direction is the one that leaves the least (Bruss and Horn 1983).
+//! alone, only the turn moves it. For a given direction, ω follows by linear least squares, and the
+//! direction with the smallest residuals is chosen (Bruss and Horn 1983).
 
 mod agreement;
 mod pitching;
@@ -19,20 +19,20 @@ use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
 
-/// Fewer points determine no turn.
+/// Fewer points do not determine a turn.
 const LEAST_POINTS: usize = 12;
-/// Residuals of well followed points, in pixels of the small image; those of larger ones count less (Cauchy).
+/// Residuals of well followed points, in pixels of the small image; larger residuals get less weight (Cauchy).
 const NOISE_PX: f64 = 0.25;
 const ROUNDS: usize = 4;
-/// Usual turns of a car between two frames that its yaw rate does not tell: pitch and roll, radians.
+/// Usual turns of a car between two frames that its yaw rate does not show: pitch and roll, radians.
 const USUAL_TILT: f64 = 0.006;
 
-/// One pair's points in the camera's plane z = 1, and what the vehicle says.
+/// One pair's points in the camera's plane z = 1, and the motion that the vehicle measured.
 #[derive(Debug, Clone)]
 pub(crate) struct EpipolarPair {
     points: Vec<(Vector2<f64>, Vector2<f64>)>,
     noise: f64,
-    /// By the vehicle.
+    /// Motion that the vehicle measured.
     pub(crate) earlier_from_later: Se3,
     pub(crate) dt_s: f64,
     /// The time half way, in seconds on the frames' clock.
@@ -40,7 +40,7 @@ pub(crate) struct EpipolarPair {
     pub(crate) speed_mps: f64,
 }
 
-/// What the points of a pair say once the direction of travel is given.
+/// What the points of a pair show for a given direction of travel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Turn {
     /// Mean robust cost of a point: ½ ln(1 + (residual / noise)²).
@@ -49,11 +49,11 @@ pub(crate) struct Turn {
     pub(crate) parallax: f64,
 }
 
-/// How much the vehicle's yaw is trusted, radians a pair; infinite where it is not.
+/// Standard deviation assumed for the vehicle's yaw, radians a pair; infinite if it is not used.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct YawTrust(pub(crate) f64);
 
-/// The pairs with points and a motion by the vehicle, its turns included.
+/// The pairs with points and a motion measured by the vehicle, with its turns.
 pub(crate) fn pairs(survey: &Survey<'_>) -> Vec<EpipolarPair> {
     let k = &survey.intrinsics;
     let of = |pair: &super::survey::SeenPair| {
@@ -76,7 +76,7 @@ fn in_plane(k: &Intrinsics, flow: &Flow) -> (Vector2<f64>, Vector2<f64>) {
 }
 
 impl EpipolarPair {
-    /// Points that a camera followed between two times, and how it moved by the vehicle; `None` for too few points.
+    /// Points that a camera followed between two times, and its motion according to the vehicle; `None` for too few points.
     pub(crate) fn new(
         followed: &[Flow],
         k: &Intrinsics,
@@ -94,8 +94,8 @@ impl EpipolarPair {
         })
     }
 
-    /// The same where the vehicle's clock is so far ahead of the frames': another motion by the vehicle. `None` where its
-    /// track does not reach so far.
+    /// The same for a vehicle's clock that is this far ahead of the frames', so with the vehicle's motion at another time.
+    /// `None` if its track does not reach that far.
     pub(crate) fn with_clock(&self, ego: &Ego<'_>, vehicle_ahead_s: f64) -> Option<Self> {
         let middle_s = self.middle_s + vehicle_ahead_s;
         let [from_s, to_s] = [-0.5, 0.5].map(|half| middle_s + half * self.dt_s);
@@ -150,24 +150,24 @@ impl EpipolarPair {
         })
     }
 
-    /// The direction of travel by the vehicle, in the camera's axes, of length 1.
+    /// The direction of travel according to the vehicle, in the camera's axes, of length 1.
     pub(crate) fn direction(&self) -> Option<Vector3<f64>> {
         self.earlier_from_later.translation().try_normalize(1e-6)
     }
 
-    /// Yaw rate by the vehicle, rad/s, positive to the left. Its axis in the camera is y, but for the mount's tilt.
+    /// Yaw rate according to the vehicle, rad/s, positive to the left. Its axis in the camera is y, except for the mount's tilt.
     pub(crate) fn vehicle_yaw_rate(&self) -> f64 {
         -self.earlier_from_later.axis_angle().y / self.dt_s
     }
 }
 
-/// B of the module's equation.
+/// The matrix B of the module's equation.
 fn turning(at: &Vector2<f64>) -> Matrix2x3<f64> {
     let (x, y) = (at.x, at.y);
     Matrix2x3::new(x * y, -(1.0 + x * x), y, 1.0 + y * y, -x * y, -x)
 }
 
-/// Direction of the epipolar line, the way a point goes; `None` at the point headed for.
+/// Direction of the epipolar line, in which a point moves; `None` at the point headed for.
 fn along(at: &Vector2<f64>, t: &Vector3<f64>) -> Option<Vector2<f64>> {
     headed_past(at, t).try_normalize(0.02)
 }
@@ -177,10 +177,10 @@ fn headed_past(at: &Vector2<f64>, t: &Vector3<f64>) -> Vector2<f64> {
     Vector2::new(at.x * t.z - t.x, at.y * t.z - t.y)
 }
 
-/// By how much the direction of travel differs from what the mount says: about the camera's x (up is
-/// positive) and y (right is positive), radians, where the pairs' cost is least.
+/// By how much the direction of travel differs from the mount's: about the camera's x (up is
+/// positive) and y (right is positive), radians, where the pairs' cost is lowest.
 pub(crate) fn heading_error(pairs: &[&EpipolarPair], yaw: YawTrust) -> Vector2<f64> {
-    /// Steps of the search, degrees: from one to the other, halved each time.
+    /// Steps of the search, degrees: from the first to the second, halved each time.
     const STEPS: (f64, f64) = (4.0, 0.04);
     let cost = |error: Vector2<f64>| -> f64 {
         let of = |pair: &&EpipolarPair| {
@@ -199,7 +199,7 @@ pub(crate) fn heading_error(pairs: &[&EpipolarPair], yaw: YawTrust) -> Vector2<f
             .map(|error| (error, cost(error)));
         let lower = next.iter().min_by(|a, b| a.1.total_cmp(&b.1));
         match lower {
-            // 0.4 rad off is no direction of travel.
+            // 0.4 rad off cannot be a direction of travel.
             Some((error, cost)) if *cost < least && error.norm() < 0.4 => {
                 (best, least) = (*error, *cost);
             }

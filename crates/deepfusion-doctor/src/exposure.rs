@@ -5,14 +5,14 @@ use super::reason::PicturesReason;
 use super::skip::PicturesSkip;
 use super::survey::Survey;
 
-/// A change of the mean grey level by more than this share is a jump of the exposure, not of the scene.
+/// A change of the mean grey level by more than this share is a jump of the exposure, not a change of the scene.
 const JUMP: f64 = 0.12;
 /// Share of neighbours that may jump, percent.
 const MOST_JUMPS: f64 = 2.0;
-/// Median share of a picture that may be all but black or all but white, percent.
+/// Median share of a picture that may be almost black or almost white, percent.
 const MOST_DARK: f64 = 60.0;
 const MOST_WHITE: f64 = 40.0;
-/// Added to grey levels before ratios: a lamp passing in the dark is no jump.
+/// Added to grey levels before taking ratios: a lamp passing in the dark is not a jump.
 const FLOOR: f64 = 10.0;
 
 pub(super) fn check(survey: &Survey<'_>) -> Outcome {

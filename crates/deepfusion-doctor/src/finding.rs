@@ -1,4 +1,4 @@
-//! What a check says: a figure against its limit, and, where it does not hold, what is wrong and what to do.
+//! What a check reports: a figure with its limit and, if it is outside the limit, what is wrong and what to do.
 
 use super::reason::FindingReason;
 use super::skip::SkipReason;
@@ -9,23 +9,23 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// Good to know.
+    /// Good to know; nothing is wrong.
     Note,
-    /// Training runs, and its result will suffer.
+    /// Training runs, but its result will suffer.
     Warning,
     /// Training fails, or its depths have a wrong scale.
     Error,
 }
 
-/// What a figure has to keep to.
+/// The limit of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {
-    /// Not above.
+    /// At most this value.
     AtMost(f64),
-    /// Not below.
+    /// At least this value.
     AtLeast(f64),
-    /// From the first to the second, both included.
+    /// From the first value to the second, both included.
     Within(f64, f64),
 }
 
@@ -34,12 +34,12 @@ pub enum Limit {
 pub struct Figure {
     /// What was measured, in a few words.
     pub quantity: &'static str,
-    /// The number.
+    /// The measured value.
     #[serde(serialize_with = "finite")]
     pub value: f64,
     /// Its unit, empty for a ratio.
     pub unit: &'static str,
-    /// What it has to keep to.
+    /// The limit it is compared with.
     pub limit: Limit,
 }
 
@@ -50,26 +50,26 @@ pub struct Finding {
     pub severity: Severity,
     /// The check that found it, such as `clock`.
     pub check: &'static str,
-    /// The number of the frame it is about, where it is about one; the first, where it is about several.
+    /// Number of the frame it is about, if it is about one; the first, if it is about several.
     pub frame: Option<u64>,
-    /// What was measured, where something was.
+    /// The figure, if one was measured.
     pub figure: Option<Figure>,
-    /// What is wrong, and what it does to a training; in JSON a sentence.
+    /// What is wrong, and how it affects training; in JSON a sentence.
     pub what: FindingReason,
     /// What to do about it: [`FindingReason::hint`], or a program's own words.
     #[serde(rename = "remedy")]
     pub hint: String,
 }
 
-/// How a check came out.
+/// The result of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// It looked, and what it looked at is in order.
+    /// It was made, and everything is in order.
     Ok,
-    /// It found something.
+    /// It was made, and found something.
     Found,
-    /// It could not look; why is in the `skipped` of its outcome.
+    /// It could not be made; the reason is in the `skipped` of its outcome.
     NotChecked,
 }
 
@@ -78,16 +78,16 @@ pub enum Status {
 pub struct Outcome {
     /// The check's name.
     pub check: &'static str,
-    /// Everything it measured, whether it holds or not.
+    /// Everything it measured, within the limits or not.
     pub measured: Vec<Figure>,
-    /// Why it could not measure, if so; in JSON a sentence.
+    /// Why it could not measure, if it could not; in JSON a sentence.
     pub skipped: Option<SkipReason>,
     /// What it found.
     pub findings: Vec<Finding>,
 }
 
 impl Limit {
-    /// Whether a value keeps to it. NaN does not.
+    /// Whether a value is within it. NaN is not.
     #[must_use]
     pub fn holds(&self, value: f64) -> bool {
         match *self {
@@ -110,7 +110,7 @@ impl Figure {
         }
     }
 
-    /// Whether it keeps to its limit.
+    /// Whether it is within its limit.
     #[must_use]
     pub fn holds(&self) -> bool {
         self.limit.holds(self.value)
@@ -118,8 +118,8 @@ impl Figure {
 }
 
 impl Outcome {
-    /// How it came out. A check that measured one thing of two counts as one that looked, and one that merely notes what follows from not
-    /// having looked as one that did not.
+    /// The result. A check that could measure one thing of two counts as made. One that only notes the consequences of not having
+    /// measured counts as not made.
     #[must_use]
     pub fn status(&self) -> Status {
         let complains = self.findings.iter().any(|f| f.severity > Severity::Note);
@@ -132,14 +132,14 @@ impl Outcome {
         }
     }
 
-    /// How many of its findings are as bad as this.
+    /// How many of its findings have this severity.
     #[must_use]
     pub fn count(&self, severity: Severity) -> usize {
         let findings = self.findings.iter();
         findings.filter(|found| found.severity == severity).count()
     }
 
-    /// Of a check that has not measured yet.
+    /// The outcome of a check before it measures.
     pub(crate) fn new(check: &'static str) -> Self {
         Self {
             check,
@@ -149,7 +149,7 @@ impl Outcome {
         }
     }
 
-    /// Of a check that cannot measure.
+    /// The outcome of a check that cannot measure.
     pub(crate) fn skipped(check: &'static str, why: impl Into<SkipReason>) -> Self {
         Self {
             skipped: Some(why.into()),
@@ -157,7 +157,7 @@ impl Outcome {
         }
     }
 
-    /// Notes a figure; where it does not hold, `what` becomes a finding.
+    /// Adds a figure; if it is outside its limit, `what` becomes a finding.
     pub(crate) fn judge<W: Into<FindingReason>>(
         &mut self,
         severity: Severity,
@@ -167,7 +167,7 @@ impl Outcome {
         self.judge_at(severity, None, figure, what);
     }
 
-    /// The same of a figure that comes from single frames: the first of them, to look at.
+    /// The same for a figure that comes from single frames; `frame` is the first of them.
     pub(crate) fn judge_at<W: Into<FindingReason>>(
         &mut self,
         severity: Severity,
@@ -181,7 +181,7 @@ impl Outcome {
         self.measured.push(figure);
     }
 
-    /// A finding without a figure, about a frame or the whole.
+    /// Adds a finding without a figure, about a frame or the whole drive.
     pub(crate) fn find(
         &mut self,
         severity: Severity,
@@ -237,7 +237,7 @@ impl fmt::Display for Figure {
     }
 }
 
-/// Three digits that count.
+/// The value with three significant digits.
 fn short(value: f64) -> String {
     let digits = match value.abs() {
         v if v >= 100.0 => 0,
@@ -253,12 +253,12 @@ fn short(value: f64) -> String {
     }
 }
 
-/// JSON has no infinity; `null` stands for what is not finite.
+/// JSON has no infinity or NaN; `null` stands for them.
 fn finite<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     value.is_finite().then_some(*value).serialize(serializer)
 }
 
-/// The middle of the values; NaN where there is none.
+/// The median of the values; NaN for none.
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)

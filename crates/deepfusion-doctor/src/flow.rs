@@ -12,19 +12,19 @@ const LEVELS: usize = 4;
 const ITERATIONS: usize = 8;
 /// Smaller eigenvalue of the mean structure tensor below which there is no corner, squared grey levels.
 const LEAST_CORNER: f64 = 4.0;
-/// Followed forth and back a point has to return within this, in pixels.
+/// A point followed forth and back has to return within this distance, in pixels.
 const RETURN_PX: f64 = 0.3;
 
 /// A point that was followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Flow {
-    /// Where it was, u then v.
+    /// Position in the earlier picture, u then v.
     pub(crate) at: [f64; 2],
-    /// How far it moved.
+    /// Displacement, u then v.
     pub(crate) by: [f64; 2],
 }
 
-/// The corners of the earlier picture, and where the later one has them.
+/// The corners of the earlier picture, with their displacement to the later one.
 pub(crate) fn flow(earlier: &GreyImage, later: &GreyImage) -> Vec<Flow> {
     let (a, b) = (pyramid(earlier), pyramid(later));
     if a.len() != b.len() {
@@ -41,7 +41,7 @@ pub(crate) fn flow(earlier: &GreyImage, later: &GreyImage) -> Vec<Flow> {
     corners(earlier).into_iter().filter_map(follow).collect()
 }
 
-/// The best corner of each cell, if it is one.
+/// The best corner of each cell that has one.
 fn corners(image: &GreyImage) -> Vec<Vector2<f64>> {
     let border = REACH as usize + 2;
     let mut found = Vec::new();
@@ -79,7 +79,7 @@ fn corner_strength(image: &GreyImage, x: usize, y: usize) -> f64 {
     f64::from(half - (0.25 * (xx - yy).powi(2) + xy * xy).sqrt()) / 25.0
 }
 
-/// Full size first, then halves.
+/// The picture at full size, then halved repeatedly.
 fn pyramid(image: &GreyImage) -> Vec<GreyImage> {
     let mut levels = vec![image.clone()];
     while levels.len() < LEVELS {
@@ -108,19 +108,19 @@ fn half(image: &GreyImage) -> Option<GreyImage> {
     })
 }
 
-/// Where a point of `a` lies in `b`, coarse to fine; `None` where the window leaves the picture or has no
+/// Where a point of `a` lies in `b`, coarse to fine; `None` if the window leaves the picture or has no
 /// corner.
 fn track(a: &[GreyImage], b: &[GreyImage], at: Vector2<f64>) -> Option<Vector2<f64>> {
     let mut by = Vector2::zeros();
     for level in (0..a.len()).rev() {
         let scale = 0.5_f64.powi(level as i32);
-        // Pixel centres: the first of a half lies between the first two of the whole.
+        // Pixel centres: the first of a half-size picture lies between the first two of the full-size one.
         let here = (at + Vector2::repeat(0.5)) * scale - Vector2::repeat(0.5);
         let found = refine(&a[level], &b[level], here, by * scale);
         match (found, level) {
             (Some(found), _) => by = found / scale,
             (None, 0) => return None,
-            // A coarse level may be too small about this point; the finer ones then do without it.
+            // A coarse level may be too small around this point; the finer ones then work without it.
             (None, _) => {}
         }
     }
@@ -147,7 +147,7 @@ fn refine(
     let mean = mean(&patch);
     let mean_slope = slopes.iter().sum::<Vector2<f64>>() / slopes.len() as f64;
     for slope in &mut slopes {
-        // Without its mean, a change of brightness does not count.
+        // The mean is subtracted, so a change of brightness does not count.
         *slope -= mean_slope;
         tensor += *slope * slope.transpose();
     }
@@ -177,7 +177,7 @@ fn refine(
     inside(b, at + by).map(|()| by)
 }
 
-/// The `i`-th place of a window, from its middle.
+/// The `i`-th position of a window, from its centre.
 fn place(i: usize) -> Vector2<f64> {
     let side = 2 * REACH as usize + 1;
     Vector2::new(
@@ -190,7 +190,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Whether the middle of a window lies in the picture.
+/// Whether the centre of a window lies in the picture.
 fn inside(image: &GreyImage, at: Vector2<f64>) -> Option<()> {
     let within = |v: f64, size: usize| v >= 2.0 && v <= size as f64 - 3.0;
     (within(at.x, image.width) && within(at.y, image.height)).then_some(())
@@ -200,7 +200,7 @@ fn inside(image: &GreyImage, at: Vector2<f64>) -> Option<()> {
 mod tests {
     use super::*;
 
-    /// Waves, moved and grown about the middle.
+    /// A picture of waves, moved and enlarged about its centre.
     fn picture(right: f64, down: f64, growth: f64) -> GreyImage {
         let (width, height) = (200, 90);
         let value = |i: usize| {

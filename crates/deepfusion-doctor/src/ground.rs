@@ -1,4 +1,4 @@
-//! The road in the measured depth against the camera's mount: the way up, and the height.
+//! The road in the measured depth compared with the camera's mount: the direction of up, and the height.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::{CameraReason, RoadAngle};
@@ -7,23 +7,23 @@ use deepfusion_data::{Dataset, GtKind, PLAUSIBLE_HEIGHT_M};
 use deepfusion_geometry::DepthMap;
 use nalgebra::{Matrix3, Vector3};
 
-/// Frames looked at.
+/// Number of frames examined.
 const MOST_FRAMES: usize = 8;
-/// Where the road is looked for: metres ahead, metres aside, metres below the camera.
+/// Where the road is searched for: metres ahead, metres to the side, metres below the camera.
 const AHEAD_M: std::ops::Range<f64> = 3.0..18.0;
 const ASIDE_M: f64 = 4.0;
 const BELOW_M: std::ops::Range<f64> = 0.5..3.5;
 const LEAST_POINTS: usize = 60;
-/// How far the road has to be seen, metres along and across: what is shorter is a car's roof or hood as well as a road.
+/// How far the road has to be seen, metres along and across: anything shorter may be a car's roof or hood.
 const LEAST_LENGTH_M: f64 = 5.0;
 const LEAST_WIDTH_M: f64 = 2.5;
-/// Frames that have to show it, and by how much their angles may scatter about the median, as a share of the limit.
+/// Frames that have to show it, and how far their angles may scatter about the median, as a share of the limit.
 const LEAST_PLANES: usize = 4;
 const MOST_SCATTER: f64 = 0.5;
 /// Roughness of a road and noise of a scan, metres.
 const NOISE_M: f64 = 0.04;
 const ROUNDS: usize = 10;
-/// How far up may differ, degrees: cars nod, and roads are crowned (KITTI 0009's by 1.9 degrees of roll).
+/// How far up may differ, degrees: cars pitch, and roads are crowned (KITTI 0009's by 1.9 degrees of roll).
 const MOST_PITCH_DEG: f64 = 2.0;
 const MOST_TILT_DEG: f64 = 12.0;
 const MOST_ROLL_DEG: f64 = 3.5;
@@ -54,7 +54,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
             }
         }
     }
-    // What is turned by more is a wall or a car, not the road: a LiDAR that looks ahead sees little of that.
+    // A plane turned by more is a wall or a car, not the road: a LiDAR that looks ahead sees little road.
     planes.retain(|(n, _)| n.angle(&up).to_degrees() <= MOST_TILT_DEG);
     if planes.len() < LEAST_PLANES {
         let why = CameraSkip::LittleRoad {
@@ -65,7 +65,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     }
     let pitch = |(n, _): &(Vector3<f64>, f64)| turns_deg(&up, n)[0];
     let roll = |(n, _): &(Vector3<f64>, f64)| turns_deg(&up, n)[1];
-    // Road, kerb and what stands on it do not lie alike from frame to frame; a mount that is off always is by as much.
+    // Road, kerb and objects on it give different planes from frame to frame; a wrong mount is off by the same angle in all.
     let pitches = Angle::of(planes.iter().map(pitch).collect());
     let rolls = Angle::of(planes.iter().map(roll).collect());
     if pitches.scatter > MOST_SCATTER * MOST_PITCH_DEG
@@ -112,8 +112,8 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     outcome
 }
 
-/// Up by the mount, turned into up by the road: about the camera's x (the camera looks further down than its mount says) and z (it is
-/// turned anticlockwise as it looks), degrees.
+/// Rotation from up according to the mount to up according to the road, degrees: about the camera's x (the camera looks further down
+/// than its mount says) and z (it is turned anticlockwise, seen along its view).
 fn turns_deg(by_mount: &Vector3<f64>, by_road: &Vector3<f64>) -> [f64; 2] {
     let turn = by_mount.cross(by_road);
     [turn.x, turn.z].map(|sine| sine.asin().to_degrees())
@@ -122,7 +122,7 @@ fn turns_deg(by_mount: &Vector3<f64>, by_road: &Vector3<f64>) -> [f64; 2] {
 /// An angle over the frames, degrees.
 struct Angle {
     median: f64,
-    /// Median distance from it.
+    /// Median distance from the median.
     scatter: f64,
 }
 
@@ -148,8 +148,8 @@ fn points(dataset: &Dataset, frame: usize, depth: &DepthMap) -> Vec<Vector3<f64>
     known.map(point).collect()
 }
 
-/// The road's plane: its way up, and the camera's height above it; robust least squares of n·X = −h, from the mount's
-/// way up and the most usual height.
+/// The road's plane: its normal (up), and the camera's height above it. Robust least squares of n·X = −h, starting at the mount's
+/// up and the most frequent height.
 fn plane(points: &[Vector3<f64>], up: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
     let near: Vec<&Vector3<f64>> = points
         .iter()
@@ -158,7 +158,7 @@ fn plane(points: &[Vector3<f64>], up: &Vector3<f64>) -> Option<(Vector3<f64>, f6
     if near.len() < LEAST_POINTS {
         return None;
     }
-    // The road is the lowest that many points share: kerbs and cars lie above it.
+    // The road is the lowest height that many points share: kerbs and cars lie above it.
     let mut heights: Vec<f64> = near.iter().map(|p| -up.dot(p)).collect();
     heights.sort_by(f64::total_cmp);
     let start = heights[heights.len() * 7 / 10];
@@ -185,7 +185,7 @@ fn plane(points: &[Vector3<f64>], up: &Vector3<f64>) -> Option<(Vector3<f64>, f6
     (inside.len() > LEAST_POINTS / 2 && long && wide).then(|| (plane * height, height))
 }
 
-/// Where the middle nine tenths lie.
+/// The range that contains the middle nine tenths.
 fn inner_range(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let at = |share: f64| values[((values.len() - 1) as f64 * share) as usize];

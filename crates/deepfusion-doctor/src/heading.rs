@@ -1,8 +1,8 @@
-//! Where the camera looks against where it goes.
+//! The camera's direction of view compared with its direction of travel.
 //!
-//! Driving straight, everything streams out of the point headed for. The mount (`cam_from_vehicle`) says where that is
-//! in the image; the images say where it is. A difference is an error of the mount's pitch and yaw, or of the principal
-//! point: both put the vehicle's motion in a wrong direction.
+//! On a straight drive, everything moves away from the point headed for. The mount (`cam_from_vehicle`) gives its position
+//! in the image; the images show where it is. A difference is an error of the mount's pitch and yaw, or of the principal
+//! point: both give the vehicle's motion a wrong direction.
 
 use super::epipolar::{self, EpipolarPair, YawTrust, heading_error};
 use super::finding::{Figure, Limit, Outcome, Severity};
@@ -12,30 +12,30 @@ use super::survey::Survey;
 use deepfusion_data::{Dataset, Heading};
 use nalgebra::Vector2;
 
-/// Straight enough, rad/s, and fast enough, m/s.
+/// Largest yaw rate that counts as straight, rad/s, and lowest speed, m/s.
 const MOST_TURN: f64 = 0.06;
 const LEAST_MPS: f64 = 1.0;
 const LEAST_PAIRS: usize = 12;
-/// Pairs looked at.
+/// Number of pairs used.
 const MOST_PAIRS: usize = 48;
-/// The drive is cut into so many parts; their differences tell how sure the direction is.
+/// The drive is cut into this many parts; their differences give the standard error of the direction.
 const PARTS: usize = 4;
-/// Standard error that is sure enough, degrees.
+/// Largest standard error that is accurate enough, degrees.
 const SURE_DEG: f64 = 0.5;
-/// The vehicle's yaw is known to this, radians a pair.
+/// Standard deviation of the vehicle's yaw, radians a pair.
 const YAW: YawTrust = YawTrust(0.001);
-/// Differences that are a mistake, degrees. Of pitch a degree is some 12 % of the metres that are learned; in dark and slow places as much is
-/// found where nothing is off.
+/// Differences that count as a mistake, degrees. A degree of pitch is some 12 % of the learned metres. In dark and slow places the same is
+/// found although nothing is wrong.
 const WARN_DEG: f64 = 1.5;
 const ERROR_DEG: f64 = 5.0;
 
-/// Frames and pairs that are read to find it alone.
+/// Frames and pairs that are read if nothing else is checked.
 const SURVEY: (usize, usize) = (160, 80);
 
-/// Where the camera of a drive heads, against what its mount says, by its own images. Reads up to 160 of them.
+/// In which direction the camera of a drive moves, compared with its mount, from its own images. Reads up to 160 of them.
 ///
 /// # Errors
-/// [`NoHeading`] where too few of them were taken straight ahead.
+/// [`NoHeading`] if too few of them were taken driving straight ahead.
 pub fn heading(dataset: &Dataset) -> Result<Heading, NoHeading> {
     let survey = Survey::sized(dataset, SURVEY);
     measure(&epipolar::pairs(&survey))
@@ -78,8 +78,13 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     let k = &survey.dataset.intrinsics(0);
     let mut outcome = Outcome::new("heading");
     let axes = [
-        ("pitch of the way ahead", 0, k.fy, HeadingAngle::Pitch),
-        ("yaw of the way ahead", 1, k.fx, HeadingAngle::Yaw),
+        (
+            "pitch of the direction of travel",
+            0,
+            k.fy,
+            HeadingAngle::Pitch,
+        ),
+        ("yaw of the direction of travel", 1, k.fx, HeadingAngle::Yaw),
     ];
     let mut unsure = Vec::new();
     for (quantity, axis, focal, angle) in axes {

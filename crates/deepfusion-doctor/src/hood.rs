@@ -1,8 +1,8 @@
 //! Parts of the picture that belong to the ego vehicle: its hood, a black frame, a dashboard's reflection.
 //!
-//! While the vehicle moves, such a part hardly changes, and its rim stays where it is. From each side of the picture
-//! the rows (or columns) inward are followed while they hardly change over time; the part is the vehicle's where a
-//! standing edge ends it. A plain sky hardly changes either, but nothing that stays put ends it.
+//! While the vehicle moves, such a part hardly changes, and its rim stays in place. The rows (or columns) are followed
+//! inward from each side of the picture while they hardly change over time. The part belongs to the vehicle if it ends
+//! at a static edge. A plain sky hardly changes either, but does not end at a static edge.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::{ImageSide, PicturesReason};
@@ -12,16 +12,16 @@ use super::survey::Survey;
 /// The vehicle certainly moves above this, m/s.
 const MOVING_MPS: f64 = 1.0;
 const LEAST_FRAMES: usize = 12;
-/// A pixel hardly changes where its standard deviation over time is below this share of the picture's median one.
+/// A pixel hardly changes if its standard deviation over time is below this share of the picture's median one.
 const STILL: f64 = 0.35;
-/// An edge is a mean slope of so many grey levels a pixel; it stands where the slope's mean over time is this share of
+/// An edge is a mean slope of this many grey levels a pixel; it is static if the slope's mean over time is this share of
 /// its mean length.
 const EDGE: f64 = 4.0;
 const STANDS: f64 = 0.85;
-/// A part that is this thin is the lens' shade or an encoder's rim, pixels of the small picture.
+/// A part as thin as this is vignetting or an encoder's border, pixels of the small picture.
 const LEAST_DEPTH: usize = 3;
-/// Share of a side that the part may take, percent: of the bottom, where hoods are, and of the others. There a black
-/// frame takes all, and a plain sky over houses that lie ahead a sixth, in four seconds of drive up to a half.
+/// Share of a side that the part may cover, percent: of the bottom, where hoods are, and of the others. A black frame covers
+/// a whole other side, and a plain sky over houses ahead a sixth; in four seconds of drive up to a half.
 const MOST_BOTTOM: f64 = 15.0;
 const MOST_ELSEWHERE: f64 = 75.0;
 
@@ -93,16 +93,16 @@ struct StillParts {
     edge: Vec<bool>,
 }
 
-/// A side's still part.
+/// The static part at a side.
 struct Rim {
-    /// Share of the side along which there is one.
+    /// Share of the side that has one.
     share: f64,
-    /// How deep it is there (but for the deepest fiftieth), pixels of the small picture.
+    /// How deep it is there (without the deepest fiftieth), pixels of the small picture.
     depth: usize,
 }
 
 impl StillParts {
-    /// `None` where there are too few frames in motion.
+    /// `None` if there are too few frames in motion.
     fn of(survey: &Survey<'_>) -> Option<Self> {
         let moving: Vec<_> = survey
             .neighbours()
@@ -150,7 +150,7 @@ impl StillParts {
         })
     }
 
-    /// The rim along a side of `length` places, up to a third of `depth` deep; `at` gives a place's x and y.
+    /// The rim along a side of `length` positions, up to a third of `depth` deep; `at` gives the x and y of a position.
     fn rim(&self, length: usize, depth: usize, at: impl Fn(usize, usize) -> (usize, usize)) -> Rim {
         let index = |along: usize, deep: usize| {
             let (x, y) = at(along, deep);
@@ -161,7 +161,7 @@ impl StillParts {
             let mut ended = None;
             for deep in 0..depth / 3 {
                 let i = index(along, deep);
-                // Across the rim itself pixels may change: what lies beyond shines in.
+                // Pixels of the rim itself may change: light from beyond it shines in.
                 if self.edge[i] {
                     ended = Some(deep);
                 } else if !self.still[i] {

@@ -1,8 +1,8 @@
-//! How one picture looks: bright or dark, sharp or blurred. Measured at full size, where blur shows.
+//! Brightness and sharpness of one picture, measured at full size, where blur shows.
 
 use image::RgbImage;
 
-/// Grey levels of 255 below and above which a pixel tells nothing.
+/// Grey levels of 255 below and above which a pixel holds no information.
 const DARK: f32 = 8.0;
 const WHITE: f32 = 250.0;
 
@@ -14,12 +14,12 @@ const LEAST_DETAIL: f64 = 2.0;
 pub(crate) struct ImageQuality {
     /// Mean grey level, 0 to 255.
     pub(crate) mean: f64,
-    /// Share of pixels that are all but black.
+    /// Share of pixels that are almost black.
     pub(crate) dark: f64,
-    /// Share of pixels that are all but white.
+    /// Share of pixels that are almost white.
     pub(crate) white: f64,
-    /// Variance of the Laplacian over the variance of the Laplacian at half the size. What is seen of
-    /// the world has about as much detail at any size; a blurred picture lacks the finest. `None` where there
+    /// Variance of the Laplacian over the variance of the Laplacian at half the size. A sharp picture of
+    /// the world has about as much detail at any size; a blurred one lacks the finest. `None` if there
     /// is no detail at either size, as in the dark.
     pub(crate) sharpness: Option<f64>,
 }

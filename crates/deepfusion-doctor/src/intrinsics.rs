@@ -1,17 +1,17 @@
-//! Whether the camera's numbers can be a camera's, and this image's.
+//! Whether the intrinsics are plausible for a camera on a car, and fit the images' size.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::{CameraReason, CentreCoordinate};
 use deepfusion_geometry::Intrinsics;
 
-/// Widths of view of cameras on cars, degrees. KITTI's is 81, UMAD's 49, the simulator's 81.
+/// Fields of view of cameras on cars, degrees. KITTI's is 81, UMAD's 49, the simulator's 81.
 const VIEW_DEG: Limit = Limit::Within(20.0, 140.0);
-/// Distance of the principal point from the middle, percent of the image's size. KITTI's 3.9, UMAD's printed row 25.
+/// Distance of the principal point from the centre, percent of the image's size. KITTI's is 3.9, UMAD's printed row 25.
 const MOST_OFF: f64 = 12.0;
-/// f_x / f_y of square pixels is 1; resized without keeping the ratio of sides it is not. UMAD's 0.97, and
+/// f_x / f_y of square pixels is 1; of images resized with another aspect ratio it is not. UMAD's is 0.97, and
 /// 640×192 of KITTI's 1.01.
 const RATIO: Limit = Limit::Within(0.8, 1.25);
-/// Sizes that cameras and data sets have.
+/// Usual image sizes of cameras and data sets.
 const SIZES: [(u32, u32); 25] = [
     (320, 240),
     (416, 128),
@@ -65,7 +65,7 @@ pub(super) fn check(k: &Intrinsics) -> Outcome {
     let (off_x, off_y) = (off(k.cx, width), off(k.cy, height));
     let other = other_size(k);
     let limit = Limit::Within(-MOST_OFF, MOST_OFF);
-    // Far to the right or below in both: a matrix of another size, whose focal length is wrong as well.
+    // Far to the right or below in both: intrinsics of another image size, so the focal length is wrong as well.
     let severity = match other {
         Some(_) => Severity::Error,
         None => Severity::Warning,
@@ -95,7 +95,7 @@ pub(super) fn check(k: &Intrinsics) -> Outcome {
     outcome
 }
 
-/// The size of image that a principal point off the middle in both axes belongs to, if it fits one: a usual size, or
+/// The image size that a principal point off the centre in both axes fits, if any: a usual size, or
 /// this one times a factor.
 fn other_size(k: &Intrinsics) -> Option<(u32, u32)> {
     let (w, h) = (2.0 * k.cx + 1.0, 2.0 * k.cy + 1.0);
@@ -106,7 +106,7 @@ fn other_size(k: &Intrinsics) -> Option<(u32, u32)> {
     }
     let miss = |(a, b): &(u32, u32)| {
         let off = |a: f64, b: f64| (a / b - 1.0).abs();
-        // Principal points lie less exactly in the middle of the height.
+        // The row of the principal point lies less exactly in the centre.
         off(w, f64::from(*a)).max(0.6 * off(h, f64::from(*b)))
     };
     let usual = SIZES.iter().min_by(|a, b| miss(a).total_cmp(&miss(b)));
@@ -176,7 +176,7 @@ mod tests {
             "{}",
             finding.hint
         );
-        // Half of everything is no usual size; the factor still tells.
+        // Half of everything is not a usual size; the factor is still found.
         let half = Intrinsics {
             width: 640,
             height: 192,

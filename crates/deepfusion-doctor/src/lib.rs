@@ -1,9 +1,9 @@
-//! Every reason why training on a recording would fail, or give depths of a wrong scale, before it starts.
+//! Finds, before training starts, every reason why training on a recording would fail or give depths of a wrong scale.
 //!
-//! [`doctor`] opens a recording and lets one check after the other look at it. A check measures a figure and compares
-//! it with a limit; what does not keep to it is a [`Finding`] with a hint. The limits are such that the clean drives
-//! at hand (KITTI 0005 and 0009, the simulator's five places) keep to all of them. What is wrong ([`FindingReason`], which
-//! knows what to do about it) and why a check could not look ([`SkipReason`]) are types, and sentences as text and in JSON.
+//! [`doctor`] opens a recording and runs one check after the other. A check measures a figure and compares
+//! it with a limit; a figure outside its limit is a [`Finding`] with a hint. The limits are set so that the clean drives
+//! at hand (KITTI 0005 and 0009, the simulator's five places) pass all of them. What is wrong ([`FindingReason`], which
+//! has the hint) and why a check could not be made ([`SkipReason`]) are types, and sentences as text and in JSON.
 
 mod before_training;
 mod blur;
@@ -73,31 +73,31 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use survey::Survey;
 
-/// What the checks say about a recording.
+/// The results of all checks of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
-    /// What is wrong with the recording as a whole: it cannot be opened, its cameras are swapped.
+    /// Findings about the recording as a whole: it cannot be opened, its cameras are swapped.
     pub recording: Vec<Outcome>,
-    /// Each drive by itself.
+    /// The results of each drive.
     pub drives: Vec<DriveDiagnosis>,
 }
 
-/// What the checks say about one drive.
+/// The results of all checks of one drive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriveDiagnosis {
     /// The drive's name.
     pub name: String,
-    /// The camera looked at: 2 or 3.
+    /// The camera that was examined: 2 or 3.
     pub camera: u8,
-    /// The layout.
+    /// Layout of the recording.
     pub kind: DatasetKind,
-    /// Its images.
+    /// Number of images.
     pub frames: usize,
-    /// How many of them were looked at.
+    /// How many of them were examined.
     pub looked_at: usize,
-    /// Check by check.
+    /// One outcome per check.
     pub outcomes: Vec<Outcome>,
-    /// Its folder or file: another's name may be the same.
+    /// Folder or file of the drive: several drives may have the same name.
     #[serde(skip)]
     pub place: PathBuf,
     /// What was measured over time, to be drawn.
@@ -106,7 +106,7 @@ pub struct DriveDiagnosis {
 }
 
 impl Diagnosis {
-    /// Of a recording that cannot be opened: why, and what to do about it, in a program's own words.
+    /// The diagnosis of a recording that cannot be opened: why, and what to do about it, in a program's own words.
     #[must_use]
     pub fn unopened(why: String, hint: Option<String>) -> Self {
         let unopened = Self::not_opened(FindingReason::Words(why));
@@ -126,14 +126,14 @@ impl Diagnosis {
         }
     }
 
-    /// With what a file that cannot be opened as a recording holds beside its pictures: a GoPro's own log.
+    /// Adds the checks of what a file that cannot be opened as a recording holds besides its pictures: a GoPro's own log.
     #[must_use]
     pub fn with_log_within(mut self, path: &Path) -> Self {
         self.recording.extend(log::within(path));
         self
     }
 
-    /// The same, each finding in the words that `reword` puts into it: a program names its options there.
+    /// The same diagnosis with each finding reworded by `reword`: a program names its options there.
     #[must_use]
     pub fn reworded(mut self, reword: impl Fn(&mut Finding)) -> Self {
         let drives = self.drives.iter_mut().flat_map(|drive| &mut drive.outcomes);
@@ -160,14 +160,14 @@ impl Diagnosis {
         found
     }
 
-    /// The worst of the findings.
+    /// The highest severity among the findings.
     #[must_use]
     pub fn worst(&self) -> Option<Severity> {
         self.findings().first().map(|(_, finding)| finding.severity)
     }
 }
 
-/// Every check by its name, in the order in which they are reported: those of a drive, and that of both cameras.
+/// Names of all checks in the order in which they are reported: those of a drive, then that of both cameras.
 const CHECKS: [&str; 18] = [
     "opening",
     "timing",
@@ -202,10 +202,10 @@ pub fn doctor(path: &Path, intrinsics: Option<[f64; 4]>) -> Diagnosis {
     })
 }
 
-/// [`doctor`] with a camera or a clock offset given; camera and split of the options are not looked at.
+/// [`doctor`] with a given camera or clock offset; camera and split of the options are ignored.
 ///
 /// # Errors
-/// Those of [`Dataset::open`]: a recording that cannot be opened is a finding in the words of whoever asks
+/// Those of [`Dataset::open`]: the caller turns a recording that cannot be opened into a finding in its own words
 /// ([`Diagnosis::unopened`]).
 pub fn doctor_with(path: &Path, options: &OpenOptions) -> Result<Diagnosis> {
     let open = |camera| {
@@ -230,7 +230,7 @@ pub fn doctor_with(path: &Path, options: &OpenOptions) -> Result<Diagnosis> {
     })
 }
 
-/// Examines a drive of several, of which another one trains or not.
+/// Examines one drive of several, of which another one may be usable for training.
 fn examine_among(dataset: &Dataset, others_train: bool) -> DriveDiagnosis {
     let survey = Survey::of(dataset);
     let pairs = epipolar::pairs(&survey);
@@ -265,11 +265,11 @@ fn examine_among(dataset: &Dataset, others_train: bool) -> DriveDiagnosis {
     }
 }
 
-/// The offset of the camera's clock to the vehicle's, as the check `clock` measures it: by how a sample of the pictures
-/// moved. `None` without speeds and turns, or where the drive does not show it to 0.05 s.
+/// The offset of the camera's clock to the vehicle's, measured as by the check `clock`, from how a sample of the pictures
+/// moved. `None` without speeds and turns, or if the drive does not show it to 0.05 s.
 #[must_use]
 pub fn time_offset(dataset: &Dataset) -> Option<TimeOffset> {
-    // Without them no picture need be read.
+    // Without speeds and turns, no picture has to be read.
     clock_offset::rates(dataset)?.yaw_rate_radps?;
     let survey = Survey::of(dataset);
     let pairs = epipolar::pairs(&survey);
@@ -277,8 +277,8 @@ pub fn time_offset(dataset: &Dataset) -> Option<TimeOffset> {
     Some(estimate.offset)
 }
 
-/// [`deepfusion_data::inspect_with`] with the offset of the clocks measured by [`time_offset`], where one drive is looked at: a
-/// few hundred pictures are read for it.
+/// [`deepfusion_data::inspect_with`] with the clocks' offset measured by [`time_offset`], if one drive is examined.
+/// Reads a few hundred pictures for it.
 ///
 /// # Errors
 /// As [`deepfusion_data::inspect`].

@@ -1,4 +1,4 @@
-//! The vehicle's speed against the radial velocities of an FMCW LiDAR.
+//! The vehicle's speed compared with the radial velocities of an FMCW LiDAR.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::MotionReason;
@@ -7,17 +7,17 @@ use super::skip::MotionSkip;
 use deepfusion_data::{Dataset, LidarMotion};
 use nalgebra::Vector3;
 
-/// Scans looked at.
+/// Number of scans examined.
 const MOST_SCANS: usize = 40;
-/// Slower scans tell no ratio, m/s.
+/// Slower scans do not give a ratio, m/s.
 const MOVING_MPS: f64 = 1.0;
 const LEAST_SCANS: usize = 4;
-/// Speed by the vehicle over speed by the LiDAR.
+/// Speed measured by the vehicle over speed measured by the LiDAR.
 const RATIO: Limit = Limit::Within(0.95, 1.05);
 /// Sideways speed over speed, as an angle in degrees: the LiDAR's yaw on the vehicle.
 const MOST_SIDEWAYS_DEG: f64 = 1.5;
-/// Upward speed over speed, as an angle in degrees: its pitch. A loaded boot lifts the nose by some tenths, and few rays look up
-/// or down.
+/// Upward speed over speed, as an angle in degrees: the LiDAR's pitch. A loaded boot lifts the nose by some tenths, and few rays look
+/// up or down.
 const MOST_UPWARD_DEG: f64 = 2.0;
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {

@@ -1,4 +1,4 @@
-//! A log of speeds by itself, before it is put beside a video: what it is good for, what is missing, and what to do.
+//! A log of speeds on its own, before it is combined with a video: what it can be used for, what is missing, and what to do.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::LogReason;
@@ -8,22 +8,22 @@ use deepfusion_data::{Dataset, DatasetKind, Error as DataError};
 use deepfusion_logs::{Clock, DriveLog, Error, ReadOptions, may_hold_log, read};
 use std::path::Path;
 
-/// Names of the files that are looked at as logs where they are no recording.
+/// File name endings that are examined as logs if they are not recordings.
 const ENDINGS: [&str; 8] = ["gpx", "nmea", "csv", "tsv", "txt", "asc", "blf", "log"];
-/// The speeds' rate below which a car's starts and stops are lost between two of them, in 1/s.
+/// Rate of speeds below which a car's starts and stops are lost between two of them, in 1/s.
 const LEAST_HZ: f64 = 0.9;
-/// Longest gap that is bridged by itself, in seconds.
+/// Longest gap that is bridged without being asked, in seconds.
 const MOST_GAP_S: f64 = 3.5;
-/// Below it nothing is learned from a pair, in m/s.
+/// Nothing is learned from a pair below this speed, in m/s.
 const MOVING_MPS: f64 = 0.5;
 /// Least share of the time in which the vehicle should move, in percent.
 const LEAST_MOVING: f64 = 20.0;
 /// No road vehicle is faster, in m/s; km/h taken for m/s are.
 const MOST_MPS: f64 = 70.0;
-/// A distance's standard deviation at which its pair weighs half in training, in percent.
+/// A distance's standard deviation at which its pair has half the weight in training, in percent.
 const MOST_SIGMA: f64 = 5.0;
 
-/// Whether a path is a log of speeds and no recording: a file that is named like one, or a phone app's export.
+/// Whether a path is a log of speeds and not a recording: a file with such a name, or a phone app's export.
 #[must_use]
 pub fn is_log(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
@@ -36,7 +36,7 @@ pub fn is_log(path: &Path) -> bool {
         )
 }
 
-/// Examines a log by itself. One that cannot be read is a finding, not an error.
+/// Examines a log on its own. One that cannot be read is a finding, not an error.
 #[must_use]
 pub fn doctor_log(path: &Path, options: &ReadOptions) -> Diagnosis {
     let recording = match read(path, options) {
@@ -52,14 +52,14 @@ pub fn doctor_log(path: &Path, options: &ReadOptions) -> Diagnosis {
     }
 }
 
-/// What a GoPro's video holds beside its pictures; nothing where it holds no log.
+/// Checks of the log that a GoPro's video holds beside its pictures; empty if it holds none.
 pub(super) fn within(path: &Path) -> Vec<Outcome> {
     let is_video = may_hold_log(path)
         && path.is_file()
         && Dataset::kind_at(path).is_ok_and(|kind| kind == DatasetKind::Video);
     match is_video.then(|| read(path, &ReadOptions::default())) {
         Some(Ok(log)) => outcomes(path, &log),
-        // The camera's own track without a fix is worth a word; a video of another camera is not.
+        // A camera's own track without a fix is reported; a video from another camera is not.
         Some(Err(Error::NoGps { why, .. })) => {
             let mut outcome = Outcome::new("log");
             outcome.find(Severity::Warning, None, LogReason::NoSpeed(why));
@@ -69,7 +69,7 @@ pub(super) fn within(path: &Path) -> Vec<Outcome> {
     }
 }
 
-/// Check by check.
+/// The outcomes of all checks.
 fn outcomes(path: &Path, log: &DriveLog) -> Vec<Outcome> {
     vec![
         opened(path, log),
@@ -82,7 +82,7 @@ fn outcomes(path: &Path, log: &DriveLog) -> Vec<Outcome> {
     ]
 }
 
-/// What it is, and what it still needs.
+/// Reports what the log is, and what is still needed.
 fn opened(path: &Path, log: &DriveLog) -> Outcome {
     let mut outcome = Outcome::new("log");
     outcome.find(
@@ -150,7 +150,7 @@ fn moving(log: &DriveLog) -> Outcome {
     outcome
 }
 
-/// How sure the speeds are, and what that costs.
+/// How accurate the speeds are, and what that means for training.
 fn sure(log: &DriveLog) -> Outcome {
     let moving = log.speeds.iter().filter(|s| s.mps.abs() > MOVING_MPS);
     let shares: Vec<f64> = moving

@@ -6,26 +6,26 @@ use super::survey::Survey;
 use deepfusion_data::{Dataset, Error, Result};
 
 pub(super) const CHECK: &str = "opening";
-/// Pairs slower than this do not train.
+/// Pairs slower than this are not used for training.
 const MIN_SPEED_MPS: f64 = 0.5;
 
-/// How many pairs of a drive can train.
+/// How many pairs of a drive can be used for training.
 ///
 /// # Errors
-/// Where none can, as [`Dataset::snippets`].
+/// If none can, as [`Dataset::snippets`].
 pub(super) fn pairs(dataset: &Dataset) -> Result<usize> {
     Ok(dataset.snippets(&[1], MIN_SPEED_MPS)?.len())
 }
 
-/// Of a recording that cannot be opened.
+/// The outcome for a recording that cannot be opened.
 pub(super) fn failed(why: FindingReason) -> Outcome {
     let mut outcome = Outcome::new(CHECK);
     outcome.find(Severity::Error, None, why);
     outcome
 }
 
-/// Of one that can: images that cannot be read, no pair to train on, and what was taken for granted.
-/// A drive that merely has nothing to train on is left out where others of its folder have something, as training does.
+/// The outcome for a recording that can be opened: images that cannot be read, no pair to train on, and what was assumed.
+/// A drive that only has nothing to train on is left out if others of its folder have something, as training does.
 pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
     let mut outcome = Outcome::new(CHECK);
     for (number, problem) in &survey.unreadable {

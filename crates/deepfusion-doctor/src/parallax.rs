@@ -8,9 +8,9 @@ use super::survey::Survey;
 
 /// Width at which networks train, pixels.
 const TRAINING_WIDTH: f64 = 640.0;
-/// Median movement of the followed points that is left once the turn is taken out, pixels a frame at that width.
+/// Median movement of the followed points that remains without the turn, pixels a frame at that width.
 const LEAST_PX: f64 = 0.1;
-/// Standing pairs are another check's.
+/// Pairs in which the vehicle stands are left to another check.
 const MOVING_MPS: f64 = 0.5;
 
 pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {

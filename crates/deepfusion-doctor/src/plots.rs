@@ -5,16 +5,16 @@ use super::survey::Survey;
 use super::turn::picture_yaw_rate;
 use deepfusion_data::GtKind;
 
-/// A line over time.
+/// A line of values over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Line {
-    /// Its name in the key.
+    /// Its name in the legend.
     pub name: &'static str,
     /// Seconds on the frames' clock, and the value.
     pub points: Vec<(f64, f64)>,
 }
 
-/// A drive over time.
+/// Measurements of a drive over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DrivePlots {
     /// Speeds, m/s: the vehicle's, and the LiDAR's where it measures one.
@@ -29,9 +29,9 @@ pub struct DrivePlots {
     pub with_depth: Vec<usize>,
 }
 
-/// Overlays in a report.
+/// Number of overlays in a report.
 const MOST_OVERLAYS: usize = 4;
-/// LiDAR scans in a plot.
+/// Number of LiDAR scans in a plot.
 const MOST_SCANS: usize = 40;
 
 impl DrivePlots {

@@ -1,4 +1,4 @@
-//! What is wrong with a recording, by what the checks look at.
+//! What is wrong with a recording, grouped by what the checks examine.
 
 mod assumed;
 mod camera;
@@ -17,29 +17,29 @@ pub use self::pictures::{ImageSide, PicturesReason};
 
 use serde::{Serialize, Serializer};
 
-/// What to do about what cannot be opened, where nothing better is known.
+/// Hint for a recording that cannot be opened, if there is no better one.
 const CORRECT: &str = "correct what the message names";
 
-/// What is wrong with a recording, and what it does to a training.
+/// What is wrong with a recording, and how it affects training.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FindingReason {
-    /// What cannot be read, or is taken for granted.
+    /// What cannot be read, or was assumed.
     #[error(transparent)]
     Opening(#[from] OpeningReason),
     /// When the frames were taken, and whether the vehicle moved.
     #[error(transparent)]
     Frames(#[from] FramesReason),
-    /// The camera's numbers and its place on the vehicle.
+    /// The camera's intrinsics and its mount on the vehicle.
     #[error(transparent)]
     Camera(#[from] CameraReason),
     /// The vehicle's speeds and turns, and its clock.
     #[error(transparent)]
     Motion(#[from] MotionReason),
-    /// How the pictures look.
+    /// The pictures' motion, brightness and sharpness.
     #[error(transparent)]
     Pictures(#[from] PicturesReason),
-    /// A log of speeds by itself.
+    /// A log of speeds on its own.
     #[error(transparent)]
     Log(#[from] LogReason),
     /// A program's own words ([`crate::Diagnosis::unopened`], [`crate::Diagnosis::reworded`]).
@@ -63,7 +63,7 @@ impl FindingReason {
     }
 }
 
-/// As its text.
+/// As a string: the message.
 impl Serialize for FindingReason {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
@@ -74,7 +74,7 @@ impl Serialize for FindingReason {
 mod tests {
     use super::*;
 
-    /// One of each kind, with what to do about it: what a kind says itself is tested beside it.
+    /// One of each kind with its hint. All messages of a kind are tested beside it.
     #[test]
     fn a_reason_says_what_its_kind_says() {
         let reasons: [FindingReason; 7] = [
@@ -87,22 +87,22 @@ mod tests {
             FindingReason::Words("its gyroscope was warm".into()),
         ];
         let said = [
-            "no yaw rate was recorded, but a track of positions: the clock can be checked, turns and the camera's direction cannot; training \
+            "no yaw rate was recorded, only a track of positions: the clock can be checked, but not turns and the camera's direction; training \
              takes the turns from the images",
-            "its time stamp is 0.500 s before the frame before",
-            "what camera 2 sees lies further right in camera 3: the two are swapped",
-            "the picture's turns do not follow the vehicle's: clock, yaw rate or camera are not of this drive",
+            "its time stamp is 0.500 s earlier than that of the frame before",
+            "points lie further right in camera 3 than in camera 2: the cameras are swapped",
+            "the picture's turns do not follow the vehicle's: the clock, yaw rate or camera belongs to another drive",
             "most of the picture is black: nothing can be compared there",
-            "dates without a zone, taken for UTC: hours off where they are local",
+            "the times are dates without a time zone, taken as UTC: hours off if they are local",
             "its gyroscope was warm",
         ];
         let hints = [
             "record an inertial unit or the steering angle",
             "sort the frames by time, or correct the time stamps",
-            "rename image_02 to image_03 and the other way round",
+            "swap the folders image_02 and image_03",
             "compare the time stamps and the yaw rate's unit (rad/s) and axis (z up)",
             "expose longer, or leave the darkest drives out",
-            "say the log's time zone; pictures and speeds show what is left between the clocks",
+            "give the log's time zone; pictures and speeds show what remains of the clocks' offset",
             "correct what the message names",
         ];
         for ((reason, said), hint) in reasons.into_iter().zip(said).zip(hints) {

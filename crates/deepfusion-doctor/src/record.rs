@@ -1,4 +1,4 @@
-//! What the checks say, as a document for scripts.
+//! The results of all checks, as a document for scripts.
 
 use serde::Serialize;
 
@@ -7,46 +7,46 @@ use crate::{Diagnosis, DriveDiagnosis, Finding, Outcome, Severity, SkipReason, S
 /// A [`Diagnosis`] with its findings counted and in one list.
 #[derive(Debug, Serialize)]
 pub struct DiagnosisRecord<'a> {
-    /// A line for each check.
+    /// One entry per check.
     pub checks: Vec<CheckRecord<'a>>,
-    /// Findings that make training fail or its scale wrong.
+    /// Number of findings that make training fail or its scale wrong.
     pub errors: usize,
-    /// Findings that make it worse.
+    /// Number of findings that make the result of training worse.
     pub warnings: usize,
     /// All findings, the worst first.
     pub findings: Vec<FindingRecord<'a>>,
     /// The checks of the recording as a whole.
     pub recording: &'a [Outcome],
-    /// Drive by drive.
+    /// The results of each drive.
     pub drives: &'a [DriveDiagnosis],
 }
 
-/// How a check went.
+/// The result of a check.
 #[derive(Debug, Serialize)]
 pub struct CheckRecord<'a> {
-    /// The drive it looked at; none where it looked at the recording.
+    /// The drive that was checked; `None` for the recording.
     pub drive: Option<&'a str>,
     /// The check's name.
     pub check: &'a str,
     /// Whether it was made, and found something.
     pub status: Status,
-    /// How much it found.
+    /// Number of findings.
     pub findings: usize,
     /// Why it was not made.
     pub why: Option<&'a SkipReason>,
 }
 
-/// A finding and where it was made.
+/// A finding and the drive it is about.
 #[derive(Debug, Serialize)]
 pub struct FindingRecord<'a> {
-    /// The drive it is about; none where it is about the recording.
+    /// The drive it is about; `None` for the recording.
     pub drive: Option<&'a str>,
     /// What was found.
     pub finding: &'a Finding,
 }
 
 impl Diagnosis {
-    /// How many findings are as bad as this.
+    /// How many findings have this severity.
     #[must_use]
     pub fn count(&self, severity: Severity) -> usize {
         let findings = self.findings();
@@ -56,7 +56,7 @@ impl Diagnosis {
             .count()
     }
 
-    /// Every check that was made or could not be, each drive's and then the whole recording's, with the drive it is about.
+    /// Every check that was made or could not be made, with its drive: each drive's, then the whole recording's.
     pub fn outcomes(&self) -> impl Iterator<Item = (Option<&str>, &Outcome)> {
         let drives = self.drives.iter();
         let drives =
@@ -64,7 +64,7 @@ impl Diagnosis {
         drives.chain(self.recording.iter().map(|o| (None, o)))
     }
 
-    /// For scripts.
+    /// The diagnosis as a document for scripts.
     #[must_use]
     pub fn record(&self) -> DiagnosisRecord<'_> {
         let checks = self.outcomes().map(|(drive, outcome)| CheckRecord {

@@ -1,7 +1,7 @@
-//! How a vehicle turned, by its own images.
+//! How a vehicle turned, according to its own images.
 //!
-//! A body on springs rolls and pitches by a tenth of a degree from one image to the next, which moves the picture as much as a metre's drive
-//! moves the road 25 m ahead. Whoever has a yaw rate alone does not know of it. The points of two images do: the camera's turn follows from
+//! A body on springs rolls and pitches by a tenth of a degree from one image to the next. That moves the picture as much as driving one
+//! metre moves the road 25 m ahead, and a yaw rate alone does not show it. The points of two images do: the camera's turn follows from
 //! them ([`super::epipolar`]), and the vehicle's roll, pitch and yaw from that by the mount.
 
 use super::epipolar::EpipolarPair;
@@ -13,26 +13,26 @@ use deepfusion_motion::GreyImage;
 use nalgebra::Rotation3;
 use rayon::prelude::*;
 
-/// Images that are in memory at a time.
+/// Number of images in memory at a time.
 const AT_ONCE: usize = 64;
-/// Turn to the side above which a pair shows no roll and pitch, radians: the movement of points is linear in small turns alone.
+/// Yaw above which a pair gives no roll and pitch, radians: the movement of points is linear for small turns only.
 const MOST_YAW: f64 = 0.08;
-/// Passes over a pair whose yaw nobody measured: the way that it went depends on it.
+/// Passes over a pair without a measured yaw: its direction of travel depends on the yaw.
 const PASSES: usize = 3;
 
-/// The way in which turns are found. Who changes it counts this up: turns that are kept are good for one way alone.
+/// Version of the method that finds turns. A change of the method increases it: stored turns are valid for one version only.
 pub const SEEN_TURNS_VERSION: u32 = 1;
 
-/// What [`seen_turns`] finds.
+/// The result of [`seen_turns`].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TurnsOfImages {
     /// The turns, in the order of time.
     pub turns: Vec<SeenTurn>,
-    /// How many images could not be read; where that was a disk's fault, another time shows more.
+    /// How many images could not be read. If that was a fault of the disk, another run may find more turns.
     pub unread: usize,
 }
 
-/// How the vehicle turned from each image to the next, in their order, where enough points show it and the way between them is known.
+/// How the vehicle turned from each image to the next, in order, if enough points show it and the distance driven between them is known.
 /// Reads all images.
 #[must_use]
 pub fn seen_turns(dataset: &Dataset) -> TurnsOfImages {

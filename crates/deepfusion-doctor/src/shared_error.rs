@@ -1,11 +1,11 @@
-//! Errors of the readers inside what a check says.
+//! Errors of the readers inside what a check reports.
 
 use deepfusion_hint::Hint;
 use std::error::Error;
 use std::fmt;
 use std::sync::Arc;
 
-/// An error of a reader as part of what a check says, which is copied with it. Two are alike where they say the same.
+/// An error of a reader that can be cloned with the report of a check. Two are equal if their messages are equal.
 #[derive(Debug)]
 pub struct SharedError<E>(Arc<E>);
 

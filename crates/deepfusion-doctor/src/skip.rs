@@ -1,4 +1,4 @@
-//! Why a check could not look.
+//! Why a check could not be made.
 
 mod camera;
 mod clock;
@@ -18,37 +18,37 @@ use crate::shared_error::SharedError;
 use deepfusion_data::Error;
 use serde::{Serialize, Serializer};
 
-/// Why a check could not look, or not at everything.
+/// Why a check could not be made, or not in full.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SkipReason {
     /// The recording cannot be opened.
     #[error("the recording cannot be opened")]
     NotOpened,
-    /// What it looks at cannot be read.
+    /// The data that it examines cannot be read.
     #[error(transparent)]
     Unreadable(#[from] SharedError<Error>),
-    /// The frames do not show it.
+    /// The frames do not allow the check.
     #[error(transparent)]
     Frames(#[from] FramesSkip),
-    /// Nothing shows where the camera looks.
+    /// The camera's direction cannot be found.
     #[error(transparent)]
     Camera(#[from] CameraSkip),
-    /// Nothing shows how the vehicle moved.
+    /// The vehicle's motion is not known well enough.
     #[error(transparent)]
     Motion(#[from] MotionSkip),
-    /// Nothing shows how far the clocks are apart.
+    /// The clocks' offset cannot be found.
     #[error(transparent)]
     Clock(#[from] ClockSkip),
-    /// The pictures do not show it.
+    /// The pictures do not allow the check.
     #[error(transparent)]
     Pictures(#[from] PicturesSkip),
-    /// A log by itself does not say it.
+    /// The log does not allow the check.
     #[error(transparent)]
     Log(#[from] LogSkip),
 }
 
-/// As its text.
+/// As a string: the message.
 impl Serialize for SkipReason {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
@@ -61,7 +61,7 @@ mod tests {
     use std::io::ErrorKind;
     use std::path::Path;
 
-    /// One of each kind: what a kind says itself is tested beside it.
+    /// One of each kind. All messages of a kind are tested beside it.
     #[test]
     fn a_reason_says_what_its_kind_says() {
         let error = Error::file(Path::new("drive"), ErrorKind::NotFound.into());
@@ -80,11 +80,11 @@ mod tests {
             "the recording cannot be opened",
             message.as_str(),
             "the frames have no time stamps",
-            "one camera",
+            "the recording has one camera",
             "no LiDAR with radial velocities, or no scans of it while the vehicle moves",
             "no speed and yaw rate to compare the picture with",
             "no image has any detail",
-            "the camera's own clock",
+            "the log is on the camera's own clock",
         ];
         for (reason, said) in reasons.into_iter().zip(said) {
             assert_eq!(reason.to_string(), said);

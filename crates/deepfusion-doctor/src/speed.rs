@@ -1,4 +1,4 @@
-//! The speeds against the road in the images, and against the recording's own poses.
+//! The speeds compared with the road in the images, and with the recording's own poses.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::MotionReason;
@@ -10,16 +10,16 @@ use deepfusion_data::{
 };
 use deepfusion_geometry::Se3;
 
-/// Way by the poses over way by the speeds.
+/// Distance according to the poses over distance according to the speeds.
 const RATIO: Limit = Limit::Within(0.95, 1.05);
-/// Shorter ways prove nothing, metres.
+/// Shorter distances prove nothing, metres.
 const LEAST_WAY_M: f64 = 5.0;
-/// From one pose that is compared to the next, metres.
+/// Distance from one pose that is compared to the next, metres.
 const STRETCH_M: f64 = 5.0;
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {
     let mut outcome = Outcome::new("speed");
-    // Without turns nobody knows how the road should move.
+    // Without turns it is unknown how the road should move.
     let turning = turning_as_seen(dataset);
     by_road(turning.as_ref().unwrap_or(dataset), &mut outcome);
     by_poses(dataset, &mut outcome);
@@ -60,7 +60,7 @@ fn by_road(dataset: &Dataset, outcome: &mut Outcome) {
     });
 }
 
-/// A bag's poses come from another unit than its speeds; elsewhere both are one unit's.
+/// A bag's poses come from another unit than its speeds; elsewhere both come from one unit.
 fn by_poses(dataset: &Dataset, outcome: &mut Outcome) {
     if dataset.kind() != DatasetKind::Bag {
         return;
@@ -78,7 +78,7 @@ fn by_poses(dataset: &Dataset, outcome: &mut Outcome) {
         ..
     } in &paths
     {
-        // From a pose to one some metres on: poses that jitter from frame to frame go a longer way than the vehicle.
+        // From a pose to one some metres on: poses that jitter from frame to frame cover a longer distance than the vehicle.
         let (mut begin, mut moved, mut way) = (0, Se3::identity(), 0.0);
         for (i, times) in times_s.windows(2).enumerate() {
             let Some(motion) = track.motion(times[0], times[1]) else {
@@ -100,7 +100,12 @@ fn by_poses(dataset: &Dataset, outcome: &mut Outcome) {
         return;
     }
     let ratio = by_poses / by_speeds;
-    let figure = Figure::new("way by the poses over way by the speeds", ratio, "", RATIO);
+    let figure = Figure::new(
+        "distance by the poses over distance by the speeds",
+        ratio,
+        "",
+        RATIO,
+    );
     outcome.judge(Severity::Error, figure, || MotionReason::Poses {
         by_poses_m: by_poses,
         by_speeds_m: by_speeds,

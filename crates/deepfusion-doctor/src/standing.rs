@@ -5,9 +5,9 @@ use super::reason::FramesReason;
 use super::skip::FramesSkip;
 use deepfusion_data::Dataset;
 
-/// Slower pairs do not train, m/s.
+/// Slower pairs are not used for training, m/s.
 const STANDING_MPS: f64 = 0.5;
-/// Share of the pairs that may stand, percent. Above, most of the reading and all counts of epochs mislead.
+/// Share of pairs in which the vehicle may stand, percent. Above it, most of the reading is wasted and counts of epochs mislead.
 const MOST: f64 = 25.0;
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {
@@ -47,7 +47,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
 fn longest_stretch(stands: &[(u64, bool)]) -> Option<(u64, u64)> {
     let runs = stands.chunk_by(|a, b| a.1 == b.1 && a.0 + 1 == b.0);
     let standing = runs.filter(|run| run[0].1);
-    // Of equal ones the first.
+    // The first of equally long ones.
     let longest = standing.rev().max_by_key(|run| run.len())?;
     Some((longest[0].0 - 1, longest[longest.len() - 1].0))
 }

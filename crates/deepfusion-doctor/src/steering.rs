@@ -1,4 +1,4 @@
-//! How far the steering turns the vehicle, against what its gyro feels: wheelbase and steering ratio.
+//! How far the vehicle turns according to its steering, compared with its gyroscope: wheelbase and steering ratio.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::MotionReason;
@@ -6,9 +6,9 @@ use super::skip::MotionSkip;
 use deepfusion_data::{Dataset, MotionModel};
 
 const CHECK: &str = "steering";
-/// Tyres slip in fast bends, and then the vehicle turns less than its wheels point.
+/// In fast bends the tyres slip, and the vehicle turns less than its wheels point.
 const SLOW_MPS: f64 = 8.0;
-/// Less turning tells no factor, seconds.
+/// Less turning does not give a factor, seconds.
 const LEAST_TURNING_S: f64 = 3.0;
 /// The usual vehicle's slip at [`SLOW_MPS`] is 0.9.
 const FACTOR: Limit = Limit::Within(0.8, 1.2);

@@ -1,4 +1,4 @@
-//! Whether a drive's two cameras are the right way round: what the left one sees lies further left in the right one.
+//! Whether a drive's two cameras are the right way round: points of the left image must lie further left in the right one.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::flow::flow;
@@ -9,13 +9,13 @@ use deepfusion_data::{Camera, Cameras, Dataset, OpenOptions, Result, grey_image}
 use deepfusion_motion::GreyImage;
 use std::path::Path;
 
-/// Frames compared.
+/// Number of frames compared.
 const MOST_FRAMES: usize = 4;
 /// Width of the images compared, in pixels.
 const WIDTH: u32 = 320;
 const LEAST_POINTS: usize = 20;
 
-/// Of a recording with `image_02` and `image_03`.
+/// The check of a recording with `image_02` and `image_03`.
 pub(super) fn check(path: &Path, options: &OpenOptions) -> Outcome {
     const CHECK: &str = "stereo";
     let options = OpenOptions {
@@ -34,7 +34,7 @@ pub(super) fn check(path: &Path, options: &OpenOptions) -> Outcome {
     };
     let mut moved = Vec::new();
     for left in is(Camera::Left) {
-        // Drives in different places may have one name.
+        // Drives in different places may have the same name.
         let of_drive =
             |right: &&Dataset| right.name() == left.name() && right.place() == left.place();
         for right in is(Camera::Right).filter(of_drive) {
@@ -87,7 +87,7 @@ fn disparities(left: &Dataset, right: &Dataset) -> Result<Vec<f64>> {
             Ok(grey_image(&image, WIDTH, height))
         };
         let points = flow(&grey(left, a)?, &grey(right, b)?);
-        // What lies too far off tells no side.
+        // Points that lie too far apart do not show a side.
         moved.extend(points.iter().map(|p| p.by[0]).filter(|by| by.abs() > 0.3));
     }
     Ok(moved)

@@ -1,25 +1,25 @@
-//! Each check over all drives.
+//! The result of each check over all drives.
 
 use crate::{Diagnosis, Outcome, SkipReason, Status};
 
-/// A check, and how it came out wherever it looked.
+/// A check, and its outcome for every drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckSummary<'a> {
     /// The check's name.
     pub check: &'static str,
-    /// How it came out, each with the drive that it looked at; none where it looked at the recording.
+    /// The outcomes, each with its drive; `None` for the recording.
     pub outcomes: Vec<(Option<&'a str>, &'a Outcome)>,
 }
 
 impl<'a> CheckSummary<'a> {
-    /// Those that came out so, with their drives.
+    /// The drives with this status.
     pub fn with(&self, status: Status) -> impl Iterator<Item = (Option<&'a str>, &'a Outcome)> {
         let outcomes = self.outcomes.iter().copied();
         outcomes.filter(move |(_, outcome)| outcome.status() == status)
     }
 
-    /// Why it could not look, and at which drives: most drives of a folder have the same sensors, and so the same reason. Reasons are the
-    /// same where they say the same.
+    /// Why it could not be made, and for which drives. Most drives of a folder have the same sensors, and so the same reason.
+    /// Reasons are the same if their texts are.
     #[must_use]
     pub fn not_checked(&self) -> Vec<(&'a SkipReason, Vec<Option<&'a str>>)> {
         let mut reasons: Vec<(&SkipReason, Vec<Option<&str>>)> = Vec::new();
@@ -38,7 +38,7 @@ impl<'a> CheckSummary<'a> {
 }
 
 impl Diagnosis {
-    /// The checks by name, in the order in which they come.
+    /// The checks by name, in the order in which they are made.
     #[must_use]
     pub fn checks(&self) -> Vec<CheckSummary<'_>> {
         let mut checks: Vec<CheckSummary<'_>> = Vec::new();

@@ -1,4 +1,4 @@
-//! What the checks look at: a sample of a drive's frames, small and grey, and how they move.
+//! The data that the checks examine: a sample of a drive's frames, small and grey, and how they move.
 
 use super::flow::{Flow, flow};
 use super::image_quality::ImageQuality;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 const MOST_FRAMES: usize = 240;
 /// Most pairs whose points are followed.
 const MOST_FLOWS: usize = 120;
-/// Frames about so far apart are compared, in seconds: neighbours at 25 a second hardly differ.
+/// Time between frames that are compared, in seconds: neighbours at 25 a second hardly differ.
 const PAIR_S: f64 = 0.1;
 /// Width of the small images, in pixels.
 const WIDTH: u32 = 320;
@@ -24,11 +24,11 @@ const COARSE_WIDTH: u32 = 160;
 #[derive(Debug)]
 pub(crate) struct Survey<'a> {
     pub(crate) dataset: &'a Dataset,
-    /// In the order of time.
+    /// The frames, in the order of time.
     pub(crate) frames: Vec<SeenFrame>,
     /// Pairs some 0.1 s apart.
     pub(crate) pairs: Vec<SeenPair>,
-    /// Frames of the drive from one of a pair to the other: 1 at 10 a second, 2 at 25.
+    /// Frames of the drive from the first to the second of a pair: 1 at 10 a second, 2 at 25.
     pub(crate) stride: usize,
     /// The camera of the small images.
     pub(crate) intrinsics: Intrinsics,
@@ -39,7 +39,7 @@ pub(crate) struct Survey<'a> {
 /// A frame that was read.
 #[derive(Debug)]
 pub(crate) struct SeenFrame {
-    /// In [`Dataset::frames`].
+    /// Index in [`Dataset::frames`].
     pub(crate) index: usize,
     pub(crate) number: u64,
     pub(crate) small: GreyImage,
@@ -50,9 +50,9 @@ pub(crate) struct SeenFrame {
 /// Two frames that were read.
 #[derive(Debug)]
 pub(crate) struct SeenPair {
-    /// The later one, in [`Survey::frames`].
+    /// Index of the later one in [`Survey::frames`].
     pub(crate) later: usize,
-    /// The later camera's motion from the earlier one, by the vehicle: its `source_from_target` is
+    /// The later camera's motion from the earlier one, as the vehicle measured it: its `source_from_target` is
     /// `earlier_from_later`.
     pub(crate) motion: Option<EgoMotion>,
     /// How the picture moved as a whole.
@@ -67,12 +67,12 @@ impl<'a> Survey<'a> {
         Self::times(dataset, 1)
     }
 
-    /// Reads one of up to so many times the usual size.
+    /// Reads a sample of up to this many times the usual size.
     pub(crate) fn times(dataset: &'a Dataset, factor: usize) -> Self {
         Self::sized(dataset, (factor * MOST_FRAMES, factor * MOST_FLOWS))
     }
 
-    /// Reads one of up to so many frames, and follows the points of up to so many pairs.
+    /// Reads a sample of up to this many frames, and follows the points of up to this many pairs.
     pub(crate) fn sized(dataset: &'a Dataset, (most_frames, most_flows): (usize, usize)) -> Self {
         let stride = stride(dataset);
         let wanted = sample(dataset.frames().len(), stride, most_frames);
@@ -176,13 +176,13 @@ impl SeenFrame {
     }
 }
 
-/// Width and height at which this camera's images are looked at, pixels.
+/// Width and height at which this camera's images are examined, pixels.
 pub(crate) fn small_size(k: &Intrinsics) -> (u32, u32) {
     let width = WIDTH.min(k.width).max(1);
     (width, (k.height * width).div_ceil(k.width).max(1))
 }
 
-/// How many frames on the other one of a pair is.
+/// How many frames further the other one of a pair is.
 fn stride(dataset: &Dataset) -> usize {
     let mut intervals: Vec<f64> = dataset
         .frames()

@@ -1,16 +1,16 @@
-//! Rates, gaps and lost frames, by the frames' numbers and time stamps; and times at which the vehicle's motion is not
-//! known, by its own.
+//! Rates, gaps and lost frames, from the frames' numbers and time stamps; and times at which the vehicle's motion is not
+//! known, from its own time stamps.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::FramesReason;
 use super::skip::FramesSkip;
 use deepfusion_data::Dataset;
 
-/// Share of frames that may be missing, percent: KITTI's and the simulator's drives miss none.
+/// Share of frames that may be missing, percent: none are in KITTI's and the simulator's drives.
 const MOST_LOST: f64 = 1.0;
 /// Share of the time between frames at which the motion may be unknown, percent. Sensors start and end some frames apart.
 const MOST_UNKNOWN: f64 = 2.0;
-/// Intervals longer than so many usual ones are gaps.
+/// Intervals longer than this many usual ones are gaps.
 const GAP: f64 = 1.5;
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {
@@ -39,7 +39,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
             .map(|(_, apart, n)| apart / *n as f64)
             .collect(),
     );
-    // A number that is missing is a frame that is missing; where numbers go on, the time tells.
+    // A missing number is a missing frame; if the numbers are consecutive, the time shows it.
     let lost_in = |apart: f64, numbers: u64| {
         let by_time = if apart > GAP * usual * numbers as f64 {
             (apart / usual).round() - numbers as f64
@@ -62,10 +62,10 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     outcome
 }
 
-/// Where the speed has gaps, no pair can train: nothing is made up across them.
+/// No pair can train where the speed has gaps: motion is not interpolated across them.
 fn unknown_motion(dataset: &Dataset, outcome: &mut Outcome) {
     let Some(track) = dataset.track() else { return };
-    // Of each pair its first frame's number, how long it is, and whether the motion is known.
+    // For each pair: its first frame's number, its duration, and whether the motion is known.
     let pairs = dataset.frames().windows(2).filter_map(|pair| {
         let times = pair[0].time_s.zip(pair[1].time_s);
         let (from_s, to_s) = times.filter(|(from_s, to_s)| to_s > from_s)?;

@@ -1,7 +1,7 @@
-//! The camera's turns against the vehicle's: the sign tells mirrored images, the size a wrong focal length.
+//! The camera's turns compared with the vehicle's: the sign reveals mirrored images, the size a wrong focal length.
 //!
-//! A camera that turns by Δθ moves what it sees by f·Δθ, so turns measured in the images with a focal length that is
-//! too large come out too small by the same factor, whatever is seen.
+//! A camera that turns by Δθ moves the picture by f·Δθ. So turns measured in the images with a focal length that is
+//! too large come out too small by the same factor, whatever the scene.
 
 use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Severity};
@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 /// Least standard deviation of the vehicle's yaw rate that can be compared, rad/s.
 pub(super) const LEAST_TURN: f64 = 0.015;
 const LEAST_PAIRS: usize = 15;
-/// Correlation from which the slope is taken for the focal length's ratio: below, something else is wrong.
+/// Correlation from which the slope is taken as the focal length's ratio; below it, something else is wrong.
 const SURE: f64 = 0.9;
 
 pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
@@ -81,12 +81,12 @@ pub(super) fn spread(rates: &[f64]) -> f64 {
     (squares.sum::<f64>() / n).sqrt()
 }
 
-/// The yaw rate by the vehicle and by the picture, rad/s, positive to the left.
+/// The yaw rate according to the vehicle and to the picture, rad/s, positive to the left.
 fn turns(pair: &EpipolarPair) -> Option<(f64, f64)> {
     Some((pair.vehicle_yaw_rate(), -picture_turn(pair)?.y / pair.dt_s))
 }
 
-/// The camera's turn by the points that were followed, radians about its axes.
+/// The camera's turn according to the points that were followed, radians about its axes.
 pub(super) fn picture_turn(pair: &EpipolarPair) -> Option<Vector3<f64>> {
     pair.turn_of_a_pitching_body(&pair.direction()?)
 }
@@ -102,14 +102,14 @@ mod tests {
     use crate::epipolar::tests::pair;
     use deepfusion_geometry::Se3;
 
-    /// A vehicle that goes a metre ahead in a tenth of a second. Its camera turns by one rate, rad/s to the left, and it says another.
+    /// A vehicle that moves one metre ahead in 0.1 s. Its camera turns at one rate (rad/s, left); it reports another one.
     fn ahead(seen: f64, said: f64) -> EpipolarPair {
         let turn = |rate: f64| Vector3::new(0.0, -0.1 * rate, 0.0);
         let said = Se3::from_axis_angle(turn(said), Vector3::z());
         pair(Vector3::z(), turn(seen), said)
     }
 
-    /// Of a vehicle that says so many times the rates at which its camera turns.
+    /// The outcome for a vehicle that reports this many times the rates at which its camera turns.
     fn diagnosed(factor: f64) -> Outcome {
         let rates = (0..20).map(|i| 0.3 * (0.7 * f64::from(i)).sin());
         let pairs: Vec<EpipolarPair> = rates.map(|rate| ahead(rate, factor * rate)).collect();

@@ -1,15 +1,15 @@
-//! A drive that turns as its images show, where nothing else says how it turned.
+//! A drive that turns as its images show, if nothing else recorded how it turned.
 
 use super::heading::heading;
 use super::seen_turns::seen_turns;
 use deepfusion_data::{Dataset, Heading};
 use std::ops::Range;
 
-/// Frames in a row that are read: training reads all, which takes minutes of a long drive, and a part shows as well whether the speeds are right.
+/// Frames in a row that are read. Training reads all, which takes minutes for a long drive; a part suffices to check the speeds.
 const STRETCH: usize = 300;
 
-/// A stretch of the drive that turns as its images show, its camera aimed where no mount is given, as training takes it; `None` where its
-/// turns are recorded, where its speeds are not, and where the images do not show them.
+/// A stretch of the drive that turns as its images show. Without a mount, its camera points as training assumes. `None` if its
+/// turns are recorded, if its speeds are not, and if the images do not show the turns.
 pub(crate) fn turning_as_seen(dataset: &Dataset) -> Option<Dataset> {
     if dataset.yaw_known() || !dataset.tilt_unknown() {
         return None;
@@ -17,7 +17,7 @@ pub(crate) fn turning_as_seen(dataset: &Dataset) -> Option<Dataset> {
     let stretch = dataset.with_frames(longest_way(dataset)?);
     let mut turning = turned(&stretch);
     if stretch.mount_assumed() {
-        // Where it heads shows once its turns are known, and these are surer once it is known where it heads.
+        // The direction of travel needs the turns, and the turns get more accurate with the direction of travel.
         let sure = heading(&turning).ok().filter(Heading::is_sure);
         if let Some(heading) = sure {
             let mut aimed = stretch;
@@ -34,7 +34,7 @@ fn turned(dataset: &Dataset) -> Dataset {
     turning
 }
 
-/// The frames of [`STRETCH`] in a row between which the vehicle goes the longest way: where it stands, no road moves. `None` without speeds.
+/// The [`STRETCH`] frames in a row with the longest distance driven: while the vehicle stands, no road moves. `None` without speeds.
 fn longest_way(dataset: &Dataset) -> Option<Range<usize>> {
     let ego = dataset.ego().ok()?;
     let frames = dataset.frames();
@@ -47,7 +47,7 @@ fn longest_way(dataset: &Dataset) -> Option<Range<usize>> {
     Some(longest(&ways, STRETCH))
 }
 
-/// Of so many frames in a row those with the longest way, by the way from each frame to the next; all where there are no more.
+/// The `most` frames in a row with the longest distance, from the distances between neighbouring frames; all if there are no more.
 fn longest(ways: &[f64], most: usize) -> Range<usize> {
     let frames = ways.len() + 1;
     let length = most.min(frames);

@@ -1,4 +1,4 @@
-//! UMAD's camera as its paper prints it: used where a bag says nothing else, and flagged.
+//! UMAD's camera as printed in its paper: used and reported if a bag gives no other.
 
 #![allow(
     clippy::unwrap_used,

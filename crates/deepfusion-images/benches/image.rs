@@ -1,7 +1,7 @@
 //! From an image file's bytes to the network's numbers: `cargo bench -p deepfusion-images --bench image`.
 //!
-//! The picture is made here, of a KITTI frame's size (1242×375): JPEG of quality 92 with half the colour resolution
-//! (what KITTI's copies in JPEG usually are) and with all of it, and PNG. It is left in the folder that
+//! The picture is generated, with the size of a KITTI frame (1242×375), as a JPEG of quality 92 with half the colour resolution
+//! (usual for KITTI's copies in JPEG), as one with full colour resolution, and as a PNG. The files stay in the folder that
 //! `DEEPFUSION_BENCH_DIR` names (default: `deepfusion-bench` among the system's temporary files), so that
 //! `benches/peers/image_to_tensor.py` measures the same files.
 
@@ -20,7 +20,7 @@ const SIZE: (u32, u32) = (1242, 375);
 const WHOLE: [u32; 4] = [0, 0, SIZE.0, SIZE.1];
 const NETWORK: (u32, u32) = (640, 192);
 
-/// Sky over a textured street with hard edges: about 0.5 bytes a pixel as a JPEG, as real frames have.
+/// Sky over a textured street with hard edges: about 0.5 bytes a pixel as a JPEG, like real frames.
 fn picture() -> RgbImage {
     let noise = |x: u32, y: u32, seed: u32| {
         let h = (x.wrapping_mul(7919) ^ y.wrapping_mul(104_729) ^ seed.wrapping_mul(31_337))
@@ -51,10 +51,10 @@ fn folder() -> PathBuf {
     )
 }
 
-/// Makes the files, and gives the name and the bytes of each.
+/// Writes the files, and returns the name and the bytes of each.
 fn files(folder: &Path) -> Vec<(&'static str, Vec<u8>)> {
     use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
-    std::fs::create_dir_all(folder).expect("the bench's folder can be made");
+    std::fs::create_dir_all(folder).expect("the bench's folder can be created");
     let picture = picture();
     let mut files = Vec::new();
     for (name, sampling) in [

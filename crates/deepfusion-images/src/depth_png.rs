@@ -11,8 +11,8 @@ const STEPS_PER_M: f32 = 256.0;
 /// Reads a 16-bit depth PNG, in metres.
 ///
 /// # Errors
-/// As [`crate::load_rgb`], and [`Error::Image`] for an image that is not 16-bit grey: 8-bit pictures
-/// of depth have lost their metres.
+/// As [`crate::load_rgb`], and [`Error::Image`] for an image that is not 16-bit grey: in 8-bit pictures
+/// of depth the metres are lost.
 pub fn read_depth_png(path: &Path) -> Result<DepthMap> {
     let DynamicImage::ImageLuma16(image) = files::decode(path)? else {
         return Err(Error::Image {
@@ -31,11 +31,11 @@ pub fn read_depth_png(path: &Path) -> Result<DepthMap> {
     })
 }
 
-/// Writes depth as a 16-bit PNG in steps of 1/256 m, atomically. Depths beyond 255.99 m become that;
+/// Writes depth as a 16-bit PNG in steps of 1/256 m, atomically. Depths beyond 255.99 m are clamped to it;
 /// those below a step become one step, since 0 means none.
 ///
 /// # Errors
-/// [`Error::File`] where writing fails.
+/// [`Error::File`] if writing fails.
 pub fn write_depth_png(depth: &DepthMap, path: &Path) -> Result<()> {
     let steps = |d: &f32| {
         if *d > 0.0 {
@@ -47,7 +47,7 @@ pub fn write_depth_png(depth: &DepthMap, path: &Path) -> Result<()> {
     let values: Vec<u16> = depth.data.iter().map(steps).collect();
     let (width, height) = (depth.width as u32, depth.height as u32);
     let image = ImageBuffer::<Luma<u16>, _>::from_raw(width, height, values).ok_or_else(|| {
-        let problem = format!("{} depths are no {width}x{height} map", depth.data.len());
+        let problem = format!("{} depths are not a {width}x{height} map", depth.data.len());
         Error::file(path, std::io::Error::other(problem))
     })?;
     files::write_png(path, |out| image.write_to(out, ImageFormat::Png))
@@ -60,7 +60,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
-        /// What is read is what was written, to half a step; nothing stays nothing.
+        /// Depth is read as it was written, to half a step; missing depth stays missing.
         #[test]
         fn depth_survives_the_file(depths in proptest::collection::vec(prop_oneof![Just(0.0f32), 0.01..255.9f32], 12)) {
             let dir = tempfile::tempdir().unwrap();

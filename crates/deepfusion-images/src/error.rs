@@ -3,19 +3,19 @@ use deepfusion_hint::Hint;
 use image::ImageError;
 use std::path::{Path, PathBuf};
 
-/// What can go wrong with an image's file.
+/// Why an image file cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A file or folder could not be opened, read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// An image that cannot be read.
+    /// The image cannot be read.
     #[error("{}: {problem}", path.display())]
     Image {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Why it cannot be read.
         #[source]
         problem: ImageProblem,
     },
@@ -28,20 +28,20 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageProblem {
-    /// It ends early.
-    #[error("the image is truncated: the file ends within it")]
+    /// The file ends early.
+    #[error("the image is truncated: the file ends inside it")]
     Truncated,
-    /// It is of another kind.
+    /// The file has another format.
     #[error("neither a PNG nor a JPEG")]
     OtherFormat,
-    /// A JPEG that does not say its size.
+    /// The JPEG does not give its size.
     #[error("the JPEG has no frame header")]
     NoFrameHeader,
-    /// Its content is damaged.
+    /// The image data is damaged.
     #[error("cannot be decoded: {0}")]
     Undecodable(#[source] ImageError),
-    /// A picture where KITTI's annotated depth should be.
-    #[error("not a 16-bit grey PNG, which depth in steps of 1/256 m needs")]
+    /// The image is not a depth image of KITTI's format.
+    #[error("not a 16-bit grey PNG, as needed for depth in steps of 1/256 m")]
     NotAnnotatedDepth,
 }
 
@@ -51,15 +51,15 @@ impl ImageProblem {
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Truncated => {
-                "the file was cut off while copying or unpacking: fetch it again, or delete it, with its line where times are listed (frames.csv, timestamps.txt), to leave the frame out"
+                "copy the file again, or, to leave the frame out, delete it with its line in frames.csv or timestamps.txt"
             }
-            _ => "PNG and JPEG are read",
+            _ => "give a PNG or JPEG image",
         }
     }
 }
 
 impl Error {
-    /// An error of the system's at `path`.
+    /// An error of the operating system about `path`.
     #[must_use]
     pub fn file(path: &Path, source: std::io::Error) -> Self {
         FileError::new(path, source).into()

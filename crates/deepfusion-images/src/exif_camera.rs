@@ -1,4 +1,4 @@
-//! A picture's camera by its EXIF block.
+//! A picture's camera, from its EXIF block.
 
 use super::known_cameras::{FILM_DIAGONAL_MM, KnownCamera, is_action_camera};
 use deepfusion_geometry::Intrinsics;
@@ -7,28 +7,28 @@ use std::io::{BufRead, Seek};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-/// Equivalent focal lengths of lenses there are, mm.
+/// Equivalent focal lengths of real lenses, mm.
 const FOCAL_LENGTHS_MM: RangeInclusive<u32> = 5..=2000;
 
-/// A pinhole camera that a picture's EXIF block says, and by what.
+/// A pinhole camera from a picture's EXIF block, and the data it was computed from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExifCamera {
-    /// Square pixels, the principal point in the middle, in pixels of the picture as it is stored or turned by quarters.
+    /// Intrinsics in pixels of the picture as stored, or rotated by quarter turns: square pixels, the principal point in the centre.
     pub intrinsics: Intrinsics,
-    /// What it was taken from, for people.
+    /// The data it was computed from, as text for people.
     pub by: String,
-    /// Whether an action camera took it, whose wide lenses are no pinhole.
+    /// Whether an action camera took it, whose wide lenses are not pinholes.
     pub action_camera: bool,
-    /// Whether the picture is to be turned or mirrored to be upright.
+    /// Whether the picture has to be rotated or mirrored to be upright.
     pub turned: bool,
 }
 
-/// The block of a PNG or JPEG.
+/// The EXIF block of a PNG or JPEG.
 pub(super) fn block(mut bytes: impl BufRead + Seek) -> Option<Exif> {
     readable(|reader| reader.read_from_container(&mut bytes))
 }
 
-/// Of a block that is damaged what can be read, as of those that some libraries write without the end of a directory.
+/// Parses a block. Of a damaged one, the readable part is used: some libraries omit the end of a directory.
 fn readable(read: impl FnOnce(&exif::Reader) -> Result<Exif, exif::Error>) -> Option<Exif> {
     let mut reader = exif::Reader::new();
     reader.continue_on_error(true);
@@ -37,7 +37,7 @@ fn readable(read: impl FnOnce(&exif::Reader) -> Result<Exif, exif::Error>) -> Op
         .ok()
 }
 
-/// What the EXIF block of a file says of the camera of its picture, which is `size` pixels wide and high; `None` where it says nothing, or
+/// The camera in the EXIF block of a picture's file; the picture is `size` pixels wide and high. `None` if the block has no camera, or
 /// the file cannot be read.
 #[must_use]
 pub fn exif_camera(path: &Path, size: (u32, u32)) -> Option<ExifCamera> {
@@ -45,15 +45,15 @@ pub fn exif_camera(path: &Path, size: (u32, u32)) -> Option<ExifCamera> {
     camera_of(&block(std::io::BufReader::new(file))?, size)
 }
 
-/// What an EXIF block says of the camera of its picture, which is `size` pixels wide and high, as [`exif_camera`]. `block` is a TIFF structure, with or
-/// without JPEG's `Exif\0\0` before it; `None` where it says nothing, or is damaged.
+/// The camera in an EXIF block, as in [`exif_camera`]; the picture is `size` pixels wide and high. `block` is a TIFF structure, with or
+/// without JPEG's `Exif\0\0` before it; `None` if it has no camera, or is damaged.
 #[must_use]
 pub fn exif_block_camera(block: &[u8], size: (u32, u32)) -> Option<ExifCamera> {
     let tiff = block.strip_prefix(b"Exif\0\0").unwrap_or(block);
     camera_of(&readable(|reader| reader.read_raw(tiff.to_vec()))?, size)
 }
 
-/// By the focal length in 35 mm film, else by the make, the model and the lens.
+/// From the focal length in 35 mm film, else from the make, the model and the lens.
 pub(super) fn camera_of(exif: &Exif, size: (u32, u32)) -> Option<ExifCamera> {
     let (intrinsics, by) = of_film(exif, size).or_else(|| of_model(exif, size))?;
     Some(ExifCamera {
@@ -77,7 +77,7 @@ fn of_film(exif: &Exif, (width, height): (u32, u32)) -> Option<(Intrinsics, Stri
 }
 
 fn of_model(exif: &Exif, size: (u32, u32)) -> Option<(Intrinsics, String)> {
-    // 0 is EXIF's word for "not used".
+    // In EXIF, 0 means "not used".
     let zoomed = ratio(exif, Tag::DigitalZoomRatio).is_some_and(|zoom| zoom > 0.0 && zoom != 1.0);
     let lens_mm = ratio(exif, Tag::FocalLength)?;
     let (make, model) = (text(exif, Tag::Make)?, text(exif, Tag::Model)?);

@@ -1,4 +1,4 @@
-//! Images from files and to them, and which files are images.
+//! Reads and writes image files, and tells which files are images.
 
 use super::jpeg;
 use crate::{Error, ImageProblem, Result};
@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{BufRead, BufWriter, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Endings of the files that are taken for images, in small letters.
+/// Endings of file names that are taken as images, in lower case.
 pub const IMAGE_ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 
 /// The chunk that ends every PNG.
@@ -20,17 +20,17 @@ pub fn is_image(path: &Path) -> bool {
     ending.is_some_and(|e| IMAGE_ENDINGS.contains(&e.to_ascii_lowercase().as_str()))
 }
 
-/// Reads a PNG or JPEG, told apart by content, as 8-bit RGB. Grey becomes RGB, 16 bits become 8, an
+/// Reads a PNG or JPEG, recognised by content, as 8-bit RGB. Grey becomes RGB, 16 bits become 8, an
 /// alpha channel is left out.
 ///
 /// # Errors
-/// [`Error::File`], or [`Error::Image`] where the content is no such image or
+/// [`Error::File`], or [`Error::Image`] if the content is not such an image or
 /// ends early.
 pub fn load_rgb(path: &Path) -> Result<RgbImage> {
     Ok(decode(path)?.into_rgb8())
 }
 
-/// [`load_rgb`] of a file's bytes that were read already; `path` is for errors alone.
+/// [`load_rgb`] for a file's bytes that were read already; `path` is only for errors.
 ///
 /// # Errors
 /// As [`load_rgb`].
@@ -38,7 +38,7 @@ pub fn decode_rgb(bytes: &[u8], path: &Path) -> Result<RgbImage> {
     Ok(decode_bytes(bytes, path)?.into_rgb8())
 }
 
-/// Reads a PNG or JPEG in the pixel type it has.
+/// Reads a PNG or JPEG in its own pixel type.
 ///
 /// # Errors
 /// As [`load_rgb`].
@@ -47,7 +47,7 @@ pub fn decode(path: &Path) -> Result<DynamicImage> {
     decode_bytes(&bytes, path)
 }
 
-/// The same of a file's bytes; `path` is for errors alone.
+/// The same for a file's bytes; `path` is only for errors.
 ///
 /// # Errors
 /// As [`load_rgb`].
@@ -63,7 +63,7 @@ pub fn decode_bytes(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
 /// Width and height of a PNG or JPEG, from its header alone.
 ///
 /// # Errors
-/// As [`load_rgb`]; a file cut off after its header is not noticed here.
+/// As [`load_rgb`]; a file that was cut off after its header is not detected.
 pub fn image_size(path: &Path) -> Result<(u32, u32)> {
     let file = File::open(path).map_err(|e| Error::file(path, e))?;
     let mut input = std::io::BufReader::new(file);
@@ -84,8 +84,9 @@ pub fn image_size(path: &Path) -> Result<(u32, u32)> {
     }
 }
 
-/// That an image was not cut off. One that begins and ends as its format does is taken for whole; any other is read, as some programs leave out the end or
-/// add to it: cameras append to a JPEG, which is then searched for its end, and anything else is decoded.
+/// Checks that an image was not cut off. One that begins and ends as its format does is taken as complete. Any other is read, as some
+/// programs leave out the end or add to it: cameras append data to a JPEG. A JPEG is then searched for its end; anything else is
+/// decoded.
 ///
 /// # Errors
 /// As [`load_rgb`].
@@ -126,7 +127,7 @@ fn reader<R: BufRead + Seek>(input: R, path: &Path) -> Result<ImageReader<R>> {
 
 fn broken(path: &Path, error: ImageError) -> Error {
     match error {
-        // As the PNG decoder reports a cut file; a JPEG's end was looked for before.
+        // The same error as the PNG decoder's for a truncated file; the end of a JPEG was checked before.
         ImageError::IoError(io) if io.kind() == std::io::ErrorKind::UnexpectedEof => {
             truncated(path)
         }
@@ -144,18 +145,18 @@ fn truncated(path: &Path) -> Error {
     }
 }
 
-/// Writes the image as a PNG, whole or not at all; who says that it is done syncs it first.
+/// Writes the image as a PNG, complete or not at all. The file is not synced: a caller that marks it as done has to sync it first.
 ///
 /// # Errors
-/// [`Error::File`] where writing fails.
+/// [`Error::File`] if writing fails.
 pub fn save_png(image: &RgbImage, path: &Path) -> Result<()> {
     write_png(path, |out| image.write_to(out, ImageFormat::Png))
 }
 
-/// Writes a PNG, whole or not at all, by what puts it into a file.
+/// Writes a PNG, complete or not at all; `encode` writes its content.
 ///
 /// # Errors
-/// [`Error::File`] where writing fails.
+/// [`Error::File`] if writing fails.
 pub(crate) fn write_png(
     path: &Path,
     encode: impl FnOnce(&mut BufWriter<File>) -> ImageResult<()>,
@@ -167,7 +168,7 @@ pub(crate) fn write_png(
     )
 }
 
-/// The system's error inside an encoder's, named by file.
+/// The system's error inside an encoder's, with the file's path.
 fn write_failed(path: &Path, error: ImageError) -> Error {
     match error {
         ImageError::IoError(source) => Error::file(path, source),
@@ -213,7 +214,7 @@ mod tests {
                 error.contains(name) && error.contains("truncated"),
                 "{error}"
             );
-            // What stands behind the end is no damage.
+            // Data after the end is not damage.
             std::fs::write(&path, [&bytes[..], b"more"].concat()).unwrap();
             assert!(!has_both_ends(&path).unwrap(), "{name}");
             check_whole(&path).unwrap();

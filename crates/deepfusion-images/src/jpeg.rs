@@ -1,5 +1,5 @@
-//! A JPEG's size without reading it whole, and whether it is whole: decoders fill the missing part of a
-//! cut file with grey and say nothing, and a network would train on it.
+//! A JPEG's size without reading all of it, and whether it is complete: decoders silently fill the missing part of a
+//! truncated file with grey, and a network would train on it.
 
 use std::io::{Read, Result, Seek, SeekFrom};
 
@@ -12,7 +12,7 @@ pub(crate) fn is_jpeg(bytes: &[u8]) -> bool {
 }
 
 /// Width and height from the frame header (ITU-T T.81, B.2.2), skipping the segments before it. The image
-/// decoder would read the whole file; a data set of forty thousand is checked in seconds like this.
+/// decoder would read the whole file; this checks a data set of forty thousand images in seconds.
 pub(crate) fn size(input: &mut (impl Read + Seek)) -> Result<Option<(u32, u32)>> {
     let mut two = [0; 2];
     input.seek(SeekFrom::Start(2))?;
@@ -27,7 +27,7 @@ pub(crate) fn size(input: &mut (impl Read + Seek)) -> Result<Option<(u32, u32)>>
         }
         input.read_exact(&mut two)?;
         let length = u16::from_be_bytes(two);
-        // The frame headers are 0xC0 to 0xCF but for DHT, JPG and DAC.
+        // The frame headers are 0xC0 to 0xCF, except DHT, JPG and DAC.
         if (0xC0..=0xCF).contains(&code) && ![0xC4, 0xC8, 0xCC].contains(&code) {
             let mut frame = [0; 5];
             input.read_exact(&mut frame)?;
@@ -43,8 +43,8 @@ pub(crate) fn size(input: &mut (impl Read + Seek)) -> Result<Option<(u32, u32)>>
     }
 }
 
-/// Whether a JPEG has its end-of-image marker, found by walking its segments (ITU-T T.81, B.1): a
-/// thumbnail inside has such a marker too, so looking for the two bytes is not enough.
+/// Whether a JPEG has its end-of-image marker, found by walking its segments (ITU-T T.81, B.1). An embedded
+/// thumbnail has such a marker too, so searching for the two bytes is not enough.
 pub(crate) fn has_end(bytes: &[u8]) -> bool {
     let mut i = 2;
     loop {
@@ -67,7 +67,7 @@ pub(crate) fn has_end(bytes: &[u8]) -> bool {
         };
         i += usize::from(high) << 8 | usize::from(low);
         if code == SOS {
-            // Coded data up to the next marker: in it 0xFF is followed by 0 or a restart marker.
+            // Coded data up to the next marker: in it, 0xFF is followed by 0 or a restart marker.
             loop {
                 let Some(at) = memchr::memchr(0xFF, bytes.get(i..).unwrap_or_default()) else {
                     return false;

@@ -1,11 +1,11 @@
-//! Phones whose main camera's view is published, for pictures whose EXIF block names the phone and the lens, but not the
+//! Phones whose main camera's field of view is published, for pictures whose EXIF block names the phone and the lens, but not the
 //! focal length in 35 mm film.
 
-/// Diagonal of a frame of 35 mm film, 36 mm by 24 mm, which EXIF's equivalent focal lengths refer to (CIPA DC-008).
+/// Diagonal of a frame of 35 mm film, 36 mm by 24 mm, to which EXIF's equivalent focal lengths refer (CIPA DC-008).
 pub(super) const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
 
-/// Makers of action cameras, as EXIF names them. Their EXIF block has a focal length, but not which of their digital lenses was chosen, and
-/// the wide ones are no pinhole.
+/// Makers of action cameras, as EXIF names them. Their EXIF block has a focal length, but not the chosen digital lens, and
+/// the wide ones are not pinholes.
 const ACTION_CAMERA_MAKERS: [&str; 1] = ["GoPro"];
 
 /// Whether a picture's maker makes action cameras.
@@ -14,15 +14,15 @@ pub(super) fn is_action_camera(make: &str) -> bool {
     ACTION_CAMERA_MAKERS.iter().any(named)
 }
 
-/// How far EXIF's focal length may be from the main lens', as a share: other lenses of the same phone are farther away.
+/// How far EXIF's focal length may be from the main lens's, as a share: other lenses of the same phone differ by more.
 const SAME_LENS: f64 = 0.03;
 
-/// How wide a main camera sees.
+/// Field of view of a main camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum View {
-    /// Focal length in 35 mm film, in mm: Apple's way.
+    /// Focal length in 35 mm film, in mm, as Apple publishes it.
     FilmMm(f64),
-    /// From corner to corner, in degrees: Google's and Samsung's way.
+    /// Diagonal field of view, in degrees, as Google and Samsung publish it.
     DiagonalDeg(f64),
 }
 
@@ -30,10 +30,10 @@ enum View {
 #[derive(Debug, PartialEq)]
 pub(super) struct KnownCamera {
     make: &'static str,
-    /// EXIF's model, whole or, where makers add a letter by region, its beginning.
+    /// EXIF's model: the whole, or its beginning if the maker adds a letter per region.
     models: &'static [&'static str],
     whole: bool,
-    /// The lens' own focal length, in mm, as EXIF says it: it tells the main camera from the others.
+    /// The lens's own focal length, in mm, as in EXIF: it distinguishes the main camera from the others.
     lens_mm: f64,
     view: View,
 }
@@ -68,12 +68,12 @@ const fn samsung(models: &'static [&'static str], lens_mm: f64, diagonal_deg: f6
     }
 }
 
-/// Views as the makers publish them: Apple's technical specifications ("26 mm, ƒ/1.6"; support.apple.com/specs), Google's
+/// Fields of view as the makers publish them: Apple's technical specifications ("26 mm, ƒ/1.6"; support.apple.com/specs), Google's
 /// ("82° field of view"; support.google.com/pixelphone/answer/7158570), Samsung's ("FOV 85°"; the models' specifications on
-/// samsung.com). The lenses' own focal lengths are those that the phones write into EXIF. No picture of each was at hand to try
-/// them: where EXIF's lens is not the one here, the table is not used, so that a wrong row is an unused one. Left out: the Galaxy S21 and S21+,
-/// whose two longer lenses are too alike to tell them apart, and action cameras, of whose photographs the maker alone is known
-/// ([`is_action_camera`]); their videos say more ([`deepfusion_logs::GoproLens`]).
+/// samsung.com). The lenses' own focal lengths are those that the phones write into EXIF. They could not be tested with a picture of each
+/// phone. If EXIF's lens is not the one here, the table is not used, so a wrong row is an unused one. Left out: the Galaxy S21 and S21+,
+/// whose two longer lenses are too similar to tell apart, and action cameras, whose photographs only name the maker
+/// ([`is_action_camera`]); their videos contain more ([`deepfusion_logs::GoproLens`]).
 const KNOWN: &[KnownCamera] = &[
     apple(
         &["iPhone 11", "iPhone 11 Pro", "iPhone 11 Pro Max"],
@@ -100,7 +100,7 @@ const KNOWN: &[KnownCamera] = &[
 ];
 
 impl KnownCamera {
-    /// By EXIF's make, model and focal length in mm.
+    /// The row for EXIF's make, model and focal length in mm.
     pub(super) fn find(make: &str, model: &str, lens_mm: f64) -> Option<&'static Self> {
         KNOWN.iter().find(|known| {
             let named = |name: &&str| {
@@ -116,7 +116,7 @@ impl KnownCamera {
         })
     }
 
-    /// Focal length in 35 mm film, by the diagonal, in mm.
+    /// Focal length in 35 mm film, from the diagonal, in mm.
     pub(super) fn film_mm(&self) -> f64 {
         match self.view {
             View::FilmMm(mm) => mm,
@@ -124,8 +124,8 @@ impl KnownCamera {
         }
     }
 
-    /// Focal length in pixels of a picture of this size. Pictures of another shape than 4:3 are cut from the whole sensor's: wider ones
-    /// keep its long side, narrower ones its short one.
+    /// Focal length in pixels of a picture of this size. Pictures with another shape than 4:3 are cropped from the whole sensor's: wider
+    /// ones keep its long side, narrower ones its short one.
     pub(super) fn focal_px(&self, (width, height): (u32, u32)) -> f64 {
         let (long, short) = (f64::from(width.max(height)), f64::from(width.min(height)));
         let diagonal = f64::max(long * 5.0 / 4.0, short * 5.0 / 3.0);

@@ -1,8 +1,8 @@
 //! Images for depth networks.
 //!
-//! [`load_photo`] reads a single picture, upright, with the camera that EXIF says; [`load_rgb`] reads a frame as it is stored. A file that
-//! was cut off is refused: decoders fill the missing part with grey and say nothing. [`to_network_input`] resizes as PIL does and
-//! gives the network's numbers, [`read_depth_png`] and [`write_depth_png`] read and write depth as KITTI does.
+//! [`load_photo`] reads a single picture, upright, with the camera from EXIF; [`load_rgb`] reads a frame as it is stored. A truncated file
+//! is refused: decoders silently fill the missing part with grey. [`to_network_input`] resizes as PIL does and
+//! returns the network's input, [`read_depth_png`] and [`write_depth_png`] read and write depth as KITTI does.
 
 mod depth_png;
 mod error;

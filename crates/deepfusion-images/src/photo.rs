@@ -10,20 +10,21 @@ use image::metadata::Orientation;
 use std::io::Cursor;
 use std::path::Path;
 
-/// A picture, and what its EXIF block says of how it was taken.
+/// A picture, with the camera and the orientation from its EXIF block.
 #[derive(Debug, Clone)]
 pub struct Photo {
-    /// Upright: turned as EXIF's orientation says.
+    /// The picture, upright: rotated by EXIF's orientation.
     pub image: RgbImage,
-    /// The camera by EXIF's focal length in 35 mm film, or by the phone's model and lens where their view is known, with square
-    /// pixels and the principal point in the middle; `None` where nothing is said. It is the lens's nominal focal length: of a picture that was cut since it is wrong.
+    /// The camera from EXIF's focal length in 35 mm film, or from the phone's model and lens if their field of view is known, with
+    /// square pixels and the principal point in the centre; `None` if EXIF gives neither. It is the lens's nominal focal length, so it
+    /// is wrong for a picture that was cropped later.
     pub intrinsics: Option<Intrinsics>,
-    /// EXIF's orientation that the picture was turned by: 1 is as it is stored, 6 and 8 are quarter turns, 3 is half a turn.
+    /// EXIF's orientation, by which the picture was rotated: 1 is as it is stored, 6 and 8 are quarter turns, 3 is half a turn.
     pub orientation: u8,
 }
 
-/// Reads a PNG or JPEG as [`crate::load_rgb`] does, turns it upright, and takes its camera from EXIF. A block that is damaged
-/// says nothing.
+/// Reads a PNG or JPEG as [`crate::load_rgb`] does, turns it upright, and takes its camera from EXIF. A damaged block
+/// is ignored.
 ///
 /// # Errors
 /// As [`crate::load_rgb`].
@@ -102,7 +103,7 @@ mod tests {
 
     #[test]
     fn a_telephone_s_picture_is_upright_and_knows_its_lens() {
-        // 6: the right-hand side of what is stored is the bottom of the picture: turned by 90 degrees clockwise.
+        // 6: the right-hand side of the stored picture is the bottom: rotated by 90 degrees clockwise.
         let photo = load(&jpeg(&[
             (Tag::Orientation, 6),
             (Tag::FocalLengthIn35mmFilm, 26),

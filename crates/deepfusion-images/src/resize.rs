@@ -1,11 +1,11 @@
-//! Images of another size, as pixels and as a network's numbers.
+//! Resizes images, as pixels and as a network's input.
 
 use deepfusion_kernels::Filter;
 use image::RgbImage;
 use std::cell::RefCell;
 
-/// Resizes with a Lanczos filter of three lobes, antialiased when shrinking, half-pixel centres: what
-/// PIL's `LANCZOS` does, to one grey level. `width` or `height` 0 gives an empty image.
+/// Resizes with a Lanczos filter of three lobes, antialiased when shrinking, half-pixel centres, like
+/// PIL's `LANCZOS`, to one grey level. If `width` or `height` is 0, the image is empty.
 #[must_use]
 pub fn resize_rgb(image: &RgbImage, width: u32, height: u32) -> RgbImage {
     if image.dimensions() == (width, height) {
@@ -25,11 +25,11 @@ pub fn to_chw(image: &RgbImage) -> Vec<f32> {
     planes(image.as_raw())
 }
 
-/// A part of the image (x, y, width, height) as the network takes it: 3×`height`×`width` floats in [0, 1],
-/// channel by channel, resized as [`resize_rgb`] does. Pixels outside the part are not looked at.
+/// A part of the image (x, y, width, height) as the network's input: 3×`height`×`width` floats in [0, 1],
+/// channel by channel, resized as [`resize_rgb`] does. Pixels outside the part are not used.
 ///
 /// # Panics
-/// Where the part reaches out of the image.
+/// If the part is not within the image.
 #[must_use]
 pub fn to_network_input(image: &RgbImage, part: [u32; 4], width: u32, height: u32) -> Vec<f32> {
     with_resizer(|resizer| planes(resizer.resize(image, part, width, height)))
@@ -40,7 +40,7 @@ fn whole(image: &RgbImage) -> [u32; 4] {
     [0, 0, image.width(), image.height()]
 }
 
-/// One a thread: its buffers are as large as the images, and getting them from the system for every
+/// One resizer per thread: its buffers are as large as the images, and allocating them for every
 /// image took a tenth of the time.
 fn with_resizer<T>(work: impl FnOnce(&mut Resizer) -> T) -> T {
     thread_local! {
@@ -67,7 +67,7 @@ impl Resizer {
             self.resized.fill(0);
             return &self.resized;
         }
-        // Columns first, then rows, as PIL does. Overshoot at edges is cut off after each pass, so that the
+        // Columns first, then rows, as PIL does. Overshoot at edges is clamped after each pass, so the
         // other order differs by tens of levels beside high contrasts. A pass that changes nothing copies.
         self.narrowed.resize(3 * width as usize * h as usize, 0);
         let whole = (image.width(), image.height());

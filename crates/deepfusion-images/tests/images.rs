@@ -57,7 +57,7 @@ fn channels_come_one_after_another() {
     assert_eq!(to_chw(&image), [0.0, 0.2, 0.4, 0.4, 1.0, 1.0]);
 }
 
-/// A PNG and a JPEG of noise, with what an EXIF thumbnail puts into real files: an end marker early on.
+/// A PNG and a JPEG of noise, with an early end marker, as an EXIF thumbnail adds to real files.
 fn encoded() -> Vec<(&'static str, Vec<u8>)> {
     let image = RgbImage::from_fn(40, 30, |x, y| {
         let h = (x * 7919 + y * 104_729).wrapping_mul(2_654_435_761);
@@ -77,7 +77,7 @@ fn encoded() -> Vec<(&'static str, Vec<u8>)> {
 #[test]
 fn whole_images_are_read_by_content() {
     let dir = tempfile::tempdir().unwrap();
-    // The ending lies on purpose.
+    // The file's ending is wrong on purpose.
     for (ending, (_, bytes)) in ["jpg", "png"].iter().zip(encoded()) {
         let path = dir.path().join(format!("a.{ending}"));
         std::fs::write(&path, &bytes).unwrap();
@@ -85,12 +85,12 @@ fn whole_images_are_read_by_content() {
         assert_eq!(image_size(&path).unwrap(), (40, 30));
         for length in [3, 20] {
             std::fs::write(&path, &bytes[..length]).unwrap();
-            image_size(&path).expect_err("ends before its size is known");
+            image_size(&path).expect_err("the file ends before its size is known");
         }
     }
 }
 
-/// Wherever a file is cut, it is refused by name: no decoder's grey filling gets through.
+/// A file cut at any place is refused by name, so that no grey filling by a decoder is accepted.
 #[test]
 fn every_truncation_is_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -136,7 +136,7 @@ fn other_files_are_refused_with_what_is_expected() {
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 128, failure_persistence: None, ..ProptestConfig::default() })]
-    /// Damaged files are errors or pictures, never a panic.
+    /// Damaged files give errors or pictures, never a panic.
     #[test]
     fn damage_never_panics(which in 0usize..2, at in 0usize..3000, value in any::<u8>()) {
         let (_, mut bytes) = encoded().remove(which);
@@ -148,7 +148,7 @@ proptest! {
     }
 }
 
-/// What is cut off must not bleed in through the filter's margin.
+/// Pixels outside the part must not bleed in through the filter's margin.
 #[test]
 fn a_part_becomes_the_same_numbers_as_that_part_alone() {
     let source = load_rgb(&reference("resize_source.png")).unwrap();

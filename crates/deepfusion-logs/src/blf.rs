@@ -1,9 +1,9 @@
-//! CAN frames of Vector's binary log, BLF. The layout is that which python-can's documentation and Vector's own header file of the
-//! format name; numbers are little-endian.
+//! CAN frames of Vector's binary log, BLF. The layout follows python-can's documentation and Vector's own header file of the
+//! format; numbers are little-endian.
 //!
-//! A file's header (`LOGG`) says when the measurement began. Objects (`LOBJ`) follow: containers, whose bytes, inflated and put
-//! behind each other, are objects again, of which one may begin in one container and end in the next. Objects of other kinds than
-//! CAN frames are passed over.
+//! A file's header (`LOGG`) gives the start of the measurement. Objects (`LOBJ`) follow. Most are containers: their contents,
+//! decompressed and concatenated, are objects again, and one may begin in one container and end in the next. Objects other than
+//! CAN frames are skipped.
 
 use crate::error::{Error, Result};
 use crate::problem::BlfProblem;
@@ -15,14 +15,14 @@ use std::path::Path;
 /// The first bytes of a file.
 pub(crate) const MARK: [u8; 4] = *b"LOGG";
 const OBJECT: [u8; 4] = *b"LOBJ";
-/// Of an object's header, what all versions have; and what has the time.
+/// Length of the part of an object's header that all versions share, and of the part with the time.
 const BASE: usize = 16;
 const TIMED: usize = 32;
-/// The part of the file's header that is read.
+/// Length of the part of the file's header that is read.
 const HEADER: usize = 56;
-/// A container's own header behind the object's.
+/// Length of a container's own header, which follows the object's.
 const CONTAINER: usize = 16;
-/// The most that one object is believed to hold; Vector's containers have 128 kB.
+/// Largest content of an object that is accepted; Vector's containers have 128 kB.
 const MOST: usize = 1 << 28;
 
 const CAN_MESSAGE: u32 = 1;
@@ -31,7 +31,7 @@ const CAN_MESSAGE2: u32 = 86;
 const CAN_FD_MESSAGE: u32 = 100;
 const CAN_FD_MESSAGE_64: u32 = 101;
 
-/// What reading a part of a file gives.
+/// Result of reading a part of a file.
 type Parsed<T> = std::result::Result<T, BlfProblem>;
 
 /// A CAN frame of a file.
@@ -43,8 +43,8 @@ pub(crate) struct BlfFrame<'a> {
     pub(crate) data: &'a [u8],
 }
 
-/// Hands over every CAN frame with data of a file. Gives back when the measurement began: its recorder's date in nanoseconds since
-/// 1970, whose zone the format does not say; `None` where the file has none.
+/// Passes every CAN frame of a file that has data to `found`. Returns the start of the measurement: its recorder's date in nanoseconds
+/// since 1970, whose time zone the format does not give; `None` if the file has none.
 ///
 /// # Errors
 /// [`Error::File`]; [`Error::Bytes`] for a file that was cut off or is damaged, with the place in the file.
@@ -58,7 +58,7 @@ pub(crate) fn read(path: &Path, mut found: impl FnMut(BlfFrame<'_>)) -> Result<O
         input: BufReader::new(file),
     };
     let start_ns = file.header()?;
-    // What of the containers' bytes has not been read yet: the beginning of an object.
+    // The unread rest of the containers' contents: the beginning of an object.
     let mut rest: Vec<u8> = Vec::new();
     while let Some((offset, object)) = file.next()? {
         if u32_at(&object, 12) != LOG_CONTAINER {
@@ -115,7 +115,7 @@ impl Objects<'_> {
         Ok(())
     }
 
-    /// The file's header: when the measurement began.
+    /// Reads the file's header: the start of the measurement.
     fn header(&mut self) -> Result<Option<i64>> {
         let mut header = Vec::new();
         self.take("LOGG", HEADER, &mut header)?;
@@ -126,7 +126,7 @@ impl Objects<'_> {
         if !(HEADER..=MOST).contains(&size) {
             return Err(self.bad(4, "LOGG", BlfProblem::Header(size)));
         }
-        // A recorder that was switched off left the size of the header alone.
+        // A recorder that was switched off wrote only the size of the header.
         let (stated, bytes) = (u64_at(&header, 16), self.length);
         if stated > bytes {
             return Err(self.bad(bytes, "LOGG", BlfProblem::Length { stated, bytes }));
@@ -144,7 +144,7 @@ impl Objects<'_> {
     /// The next object, and where it begins; `None` at the end.
     fn next(&mut self) -> Result<Option<(u64, Vec<u8>)>> {
         let mut object = Vec::new();
-        // Up to three bytes, in some files seven, fill up an object to a whole number of words.
+        // Up to three bytes, in some files seven, pad an object to a whole number of words.
         let mut begun = self.at;
         loop {
             let left = self.length - self.at;
@@ -177,7 +177,7 @@ impl Objects<'_> {
     }
 }
 
-/// Adds what a container holds.
+/// Adds the content of a container.
 fn inflate(object: &[u8], into: &mut Vec<u8>) -> Parsed<()> {
     let (Some(head), Some(bytes)) = (
         object.get(BASE..BASE + CONTAINER),
@@ -188,14 +188,14 @@ fn inflate(object: &[u8], into: &mut Vec<u8>) -> Parsed<()> {
     let (method, size) = (u16_at(head, 0), u32_at(head, 8) as usize);
     let before = into.len();
     match method {
-        // Not every writer says the size of what is not compressed.
+        // Not every writer gives the size of uncompressed content.
         0 => {
             into.extend_from_slice(bytes);
             return Ok(());
         }
         2 if size > MOST => return Err(BlfProblem::TooLarge(size)),
         2 => {
-            // One more than it should be tells a longer one.
+            // Reads one byte more than expected, to notice longer content.
             let mut inflated = flate2::read::ZlibDecoder::new(bytes).take(size as u64 + 1);
             inflated.read_to_end(into).map_err(BlfProblem::Zlib)?;
         }
@@ -210,7 +210,7 @@ fn inflate(object: &[u8], into: &mut Vec<u8>) -> Parsed<()> {
     }
 }
 
-/// Reads the whole objects of a stream; gives back how many of its bytes they are. The error has its place.
+/// Reads the complete objects of a stream and returns their length in bytes. An error has its position.
 fn objects(
     bytes: &[u8],
     found: &mut impl FnMut(BlfFrame<'_>),
@@ -240,7 +240,7 @@ fn objects(
     }
 }
 
-/// Hands over an object's CAN frame, where it is one.
+/// Passes on an object's CAN frame, if it is one.
 fn frame(object: &[u8], found: &mut impl FnMut(BlfFrame<'_>)) -> Parsed<()> {
     let kind = u32_at(object, 12);
     if !matches!(
@@ -275,11 +275,11 @@ fn frame(object: &[u8], found: &mut impl FnMut(BlfFrame<'_>)) -> Parsed<()> {
         CAN_FD_MESSAGE_64 => (40, usize::from(byte(2)?), byte(12)? & 0x10 != 0),
         _ => (8, usize::from(byte(3)?).min(8), byte(2)? & 0x80 != 0),
     };
-    // A remote request carries nothing.
+    // A remote request has no data.
     if remote {
         return Ok(());
     }
-    // Vector's own files may say more bytes than there are: those are zeros, which no signal is read from.
+    // Vector's own files may give more bytes than there are: those are zeros, from which no signal is read.
     let Some(data) = body.get(first..body.len().min(first + length)) else {
         return Err(short());
     };
@@ -319,7 +319,7 @@ fn start_of(date: [u16; 8]) -> Option<i64> {
     i64::try_from(stamp.timestamp().as_nanosecond()).ok()
 }
 
-/// Two bytes of what is long enough.
+/// Two bytes at `at`; the caller checked the length.
 fn u16_at(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([bytes[at], bytes[at + 1]])
 }

@@ -1,4 +1,4 @@
-//! CAN frames, as text (`candump -l` and `candump -L`, Vector's ASC) or binary ([`blf`]). A DBC file says what is in them.
+//! CAN frames, as text (`candump -l` and `candump -L`, Vector's ASC) or binary ([`blf`]). A DBC file describes what they contain.
 
 use crate::blf;
 use crate::error::{BadLine, Error, Result};
@@ -11,7 +11,7 @@ use deepfusion_motion::can::{CanId, Dbc};
 use std::io::Read;
 use std::path::Path;
 
-/// What reading a part of a frame gives.
+/// Result of reading a part of a frame.
 type Parsed<T> = std::result::Result<T, CanFrameProblem>;
 
 /// A frame of a trace.
@@ -111,7 +111,7 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
     })
 }
 
-/// Keeps the frames of one bus, the one with the most: a gateway repeats a message on another, later. A note where there are several.
+/// Keeps the frames of one bus, the one with the most: a gateway repeats a message on another bus, later. Adds a note if there are several.
 fn one_channel(frames: &mut Vec<Frame>) -> Option<CanNote> {
     let mut counts: Vec<(String, usize)> = Vec::new();
     for frame in frames.iter() {
@@ -124,18 +124,18 @@ fn one_channel(frames: &mut Vec<Frame>) -> Option<CanNote> {
         return None;
     }
     let channels = counts.clone();
-    // Of as many, the first.
+    // The first of those with equally many.
     counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     let (read, _) = counts.swap_remove(0);
     frames.retain(|frame| frame.channel == read);
     Some(CanNote::Channels { channels, read })
 }
 
-/// What of a trace is used.
+/// The part of a trace that is used.
 struct Trace {
-    /// Those of one identifier.
+    /// The frames of one identifier.
     frames: Vec<Frame>,
-    /// How many frames with data of any identifier there are.
+    /// How many frames with data there are, of any identifier.
     all: usize,
     clock: Clock,
 }
@@ -167,7 +167,7 @@ fn trace(path: &Path, id: CanId) -> Result<Trace> {
     })
 }
 
-/// Whether a file is named or begins as a binary log of Vector's.
+/// Whether a file has the name or the first bytes of a Vector binary log.
 pub(crate) fn is_blf(path: &Path) -> Result<bool> {
     if path
         .extension()
@@ -183,7 +183,7 @@ pub(crate) fn is_blf(path: &Path) -> Result<bool> {
     Ok(first == blf::MARK)
 }
 
-/// The frames of one identifier of a text; others are counted and not kept, as a trace of hours has hundreds of millions.
+/// The frames of one identifier of a text. Others are counted but not kept, as a trace of hours has hundreds of millions.
 fn of_text(path: &Path, text: &str, id: CanId) -> Result<Trace> {
     let is_asc = text.lines().take(200).any(|l| {
         let l = l.trim().to_ascii_lowercase();
@@ -231,15 +231,15 @@ fn of_text(path: &Path, text: &str, id: CanId) -> Result<Trace> {
 /// SocketCAN's bit of an identifier that marks a report of an error (`CAN_ERR_FLAG` of linux/can.h).
 const CAN_ERROR: u32 = 0x2000_0000;
 
-/// What the first lines of Vector's text say: `base hex  timestamps absolute`. With `relative`, each line counts from the line before it,
-/// whatever that line holds.
+/// Settings in the first lines of Vector's text: `base hex  timestamps absolute`. With `relative`, each line's time counts from the line
+/// before it, whatever that line contains.
 #[derive(Default)]
 struct AscHeader {
     decimal: bool,
     relative: bool,
-    /// What a line's time counts from.
+    /// The time from which a line's time counts.
     begin_ns: i64,
-    /// Time of the line before on that clock.
+    /// Time of the line before, on that clock.
     before_ns: i64,
 }
 
@@ -262,21 +262,21 @@ impl AscHeader {
     }
 }
 
-/// `None` for a line without a frame, such as an empty one, or a frame without data.
+/// `None` for a line without a frame, such as an empty one, or for a frame without data.
 fn candump(line: &str) -> Option<Parsed<Frame>> {
     let rest = line.trim().strip_prefix('(')?;
     let (time, rest) = rest.split_once(')')?;
     let mut words = rest.split_whitespace();
     let (channel, frame) = (words.next()?, words.next()?);
     let (id, data) = frame.split_once('#')?;
-    // A remote request carries nothing; `##` and a digit of flags is CAN FD.
+    // A remote request has no data; `##` and a digit of flags is CAN FD.
     let data = match data.strip_prefix('#') {
         Some(fd) => fd.get(1..)?,
         None if data.starts_with(['R', 'r']) => return None,
         None => data,
     };
     let number = u32::from_str_radix(id, 16);
-    // The controller's report of an error: no frame that was on the bus.
+    // The controller's report of an error, not a frame on the bus.
     if number.as_ref().is_ok_and(|number| number & CAN_ERROR != 0) {
         return None;
     }
@@ -295,7 +295,7 @@ fn candump(line: &str) -> Option<Parsed<Frame>> {
     Some(parsed())
 }
 
-/// `   0.012345 1  1A2x  Rx   d 8 00 01 …`: time, channel, identifier (x: extended), direction, `d`, length, data; CAN FD has other words.
+/// `   0.012345 1  1A2x  Rx   d 8 00 01 …`: time, channel, identifier (x: extended), direction, `d`, length, data; CAN FD differs.
 fn asc(line: &str, decimal: bool) -> Option<Parsed<Frame>> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let time = *words.first()?;
@@ -428,7 +428,7 @@ mod tests {
         assert!(candump("(1.0) can0 00000004#0000000000000000").is_some());
     }
 
-    /// Each line counts from the one before it, one without a frame as well.
+    /// Each line counts from the one before it, even from one without a frame.
     #[test]
     fn relative_times_are_added_up() {
         let lines =
@@ -443,7 +443,7 @@ mod tests {
         }
     }
 
-    /// Other identifiers' frames are counted, and the first of all says the clock; none of them is kept.
+    /// Other identifiers' frames are counted but not kept, and the very first frame decides the clock.
     #[test]
     fn frames_of_one_identifier_are_kept() {
         let text = "(1436509052.2) can0 123#01\n(1.5) can0 124#02\n(1.6) can0 123#03\n";
@@ -473,7 +473,7 @@ mod tests {
             }
         );
         assert_eq!(two.iter().map(|f| f.ns).collect::<Vec<_>>(), [1, 2]);
-        // A gateway's copies: the bus that was heard first.
+        // A gateway's copies: the bus on which a frame was first is read.
         let mut gateway = vec![frame(0, "2"), frame(1, "1"), frame(2, "2"), frame(3, "1")];
         one_channel(&mut gateway);
         assert_eq!(gateway.iter().map(|f| f.ns).collect::<Vec<_>>(), [0, 2]);

@@ -1,20 +1,20 @@
-//! Which column is what, by its name and its unit.
+//! Which column holds what, from its name and its unit.
 
 use crate::units::SpeedUnit;
 
-/// One column's header, taken apart: `speed_kmh`, `Speed [km/h]` and `Speed (OBD)(km/h)` have the unit km/h.
+/// The parts of one column's header: `speed_kmh`, `Speed [km/h]` and `Speed (OBD)(km/h)` have the unit km/h.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Column {
-    /// As the file has it.
+    /// The header as it is in the file.
     pub(crate) header: String,
-    /// In lower case, words apart by single spaces, without the unit.
+    /// The name in lower case, words separated by single spaces, without the unit.
     pub(crate) name: String,
     /// The unit, as written.
     pub(crate) unit: Option<String>,
     pub(crate) index: usize,
 }
 
-/// Names of a column of times, the better first: a phone's own clock before the satellites', which a log has once a second.
+/// Names of a column of times, in order of preference: a phone's own clock before the satellites' time, which a log has once a second.
 pub(crate) const TIMES: [&str; 20] = [
     "time",
     "timestamp",
@@ -37,7 +37,7 @@ pub(crate) const TIMES: [&str; 20] = [
     "seconds",
     "offset",
 ];
-/// Names of a vehicle's own speed, the better first.
+/// Names of a vehicle's own speed, in order of preference.
 const OF_VEHICLE: [&str; 12] = [
     "speed",
     "velocity",
@@ -63,7 +63,7 @@ const OF_RECEIVER: [&str; 8] = [
     "sog",
     "speed 2d",
 ];
-/// Words for speed in the languages of the apps, and words beside them that make it another quantity.
+/// Words for speed in the languages of the apps, and words that turn such a name into another quantity.
 const SPEED_WORDS: [&str; 7] = [
     "speed",
     "velocity",
@@ -84,7 +84,7 @@ const OTHER_QUANTITIES: [&str; 9] = [
     "durchschnitt",
     "средн",
 ];
-/// The same where they are words of their own: "Geschwindigkeit" has wind in it.
+/// Such words that count only as whole words: "Geschwindigkeit" contains "wind".
 const OTHER_WORDS: [&str; 8] = ["avg", "mean", "max", "min", "wind", "fan", "rpm", "turbine"];
 
 impl Column {
@@ -111,18 +111,18 @@ impl Column {
         }
     }
 
-    /// The unit of speed that its header says.
+    /// The unit of speed in its header.
     pub(crate) fn speed_unit(&self) -> Option<SpeedUnit> {
         self.unit.as_deref()?.parse().ok()
     }
 
-    /// How well its name fits a vehicle's speed: the less the better, `None` where it does not.
+    /// How well its name fits a vehicle's speed: lower is better, `None` if it does not fit.
     pub(crate) fn speed_rank(&self) -> Option<usize> {
         speed_rank(&self.name)
     }
 }
 
-/// As [`Column::speed_rank`], of a name in lower case.
+/// [`Column::speed_rank`] of a name in lower case.
 pub(crate) fn speed_rank(name: &str) -> Option<usize> {
     if let Some(rank) = OF_VEHICLE.iter().position(|n| *n == name) {
         return Some(rank);
@@ -138,14 +138,14 @@ pub(crate) fn speed_rank(name: &str) -> Option<usize> {
     (speaks_of_speed && !of_another).then_some(if of_receiver { 150 } else { 50 })
 }
 
-/// A name and the unit in the brackets at its end, or behind its last underscore.
+/// A name, and the unit in the brackets at its end or after its last underscore.
 fn split_unit(text: &str) -> (&str, Option<&str>) {
     for (open, close) in [('(', ')'), ('[', ']')] {
         if let Some(inside) = text.strip_suffix(close)
             && let Some((name, unit)) = inside.rsplit_once(open)
             && !name.trim().is_empty()
         {
-            // "Speed (GPS)": a source and no unit.
+            // "Speed (GPS)": a source and not a unit.
             return match unit.trim().to_lowercase().as_str() {
                 "gps" | "obd" | "gnss" | "x" | "y" | "z" => (text, None),
                 _ => (name, Some(unit)),

@@ -1,10 +1,10 @@
-//! Times of a column: numbers of some unit, dates in the ways that recorders write them, times of day.
+//! Times of a column: numbers of some unit, dates in the forms that recorders write, times of day.
 
 use crate::log::Clock;
 use jiff::civil::{DateTime, Time};
 use jiff::fmt::strtime;
 
-/// Seconds since 1970 from 2000 to 2100: numbers in this range times a unit are taken for dates.
+/// Seconds since 1970 from 2000 to 2100: numbers in this range times a unit are taken as dates.
 const EPOCH_S: std::ops::RangeInclusive<f64> = 9.46e8..=4.102e9;
 /// Dates that are not ISO 8601: Torque's device time, Torque's GPS time, German and year-first ones.
 const DATES: [&str; 6] = [
@@ -20,7 +20,7 @@ const DAY_NS: i64 = 86_400_000_000_000;
 /// How the times of a column are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TimeStyle {
-    /// A number, and nanoseconds of one.
+    /// A number, with the nanoseconds of its unit.
     Number(i64),
     /// A date with its zone, or without.
     Date,
@@ -39,8 +39,8 @@ pub(crate) fn unit_ns(name: &str) -> Option<i64> {
     }
 }
 
-/// How the first times of a column are written; `unit` is what its header says. `None` where it cannot be known: plain numbers
-/// that are no dates, and farther apart than seconds would be.
+/// How the first times of a column are written; `unit` is the unit in its header. `None` if it cannot be known: plain numbers
+/// that are not dates, and further apart than seconds would be.
 pub(crate) fn style_of(words: &[&str], unit: Option<&str>) -> Option<TimeStyle> {
     let first = *words.first()?;
     if first.parse::<f64>().is_err() {
@@ -62,14 +62,14 @@ pub(crate) fn style_of(words: &[&str], unit: Option<&str>) -> Option<TimeStyle> 
     }
     let mut steps: Vec<f64> = numbers.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     steps.sort_by(f64::total_cmp);
-    // Rows of one moment have one time.
+    // Several rows may have the same time.
     steps.retain(|step| *step > 0.0);
     let median = *steps.get(steps.len() / 2)?;
-    // Steps of 40 could be milliseconds, or frames.
+    // Steps of 40 could be milliseconds or frames.
     (median <= 1.0).then_some(TimeStyle::Number(1_000_000_000))
 }
 
-/// A time in nanoseconds; `after` is the time before it in the column, for clocks that pass midnight.
+/// A time in nanoseconds; `after` is the preceding time in the column, for clocks that pass midnight.
 pub(crate) fn nanoseconds(word: &str, style: TimeStyle, after: Option<i64>) -> Option<i64> {
     match style {
         TimeStyle::Number(unit_ns) => number_ns(word, unit_ns),
@@ -79,14 +79,14 @@ pub(crate) fn nanoseconds(word: &str, style: TimeStyle, after: Option<i64>) -> O
             let Some(after) = after else { return Some(ns) };
             let days = after.div_euclid(DAY_NS);
             let same_day = days * DAY_NS + ns;
-            // Half a day back is midnight passed; less is a clock that went back, which is reported elsewhere.
+            // A step back of more than half a day is a passed midnight; a smaller one is a clock that went back, which is reported elsewhere.
             let passed = same_day < after - DAY_NS / 2;
             Some(same_day + if passed { DAY_NS } else { 0 })
         }
     }
 }
 
-/// From when times of this style count.
+/// The clock of times in this style.
 pub(crate) fn clock_of(word: &str, style: TimeStyle) -> Clock {
     match style {
         TimeStyle::TimeOfDay => Clock::TimeOfDay,
@@ -103,9 +103,10 @@ pub(crate) fn clock_of(word: &str, style: TimeStyle) -> Clock {
     }
 }
 
-/// A moment as a user writes it, in nanoseconds on a log's clock: seconds as a number, a date, or a time of day. A date without a zone is
-/// one of the log's own; a time of day is the one within the log, whose first and last times are `span_ns`, or nearest to it. Of a log of local
-/// dates the result is on its clock after [`in_zone`](crate::DriveLog::in_zone), `zone_s` ahead of UTC; `span_ns` is the one before it.
+/// A time as a user writes it, in nanoseconds on a log's clock: seconds as a number, a date, or a time of day. A date without a zone is
+/// in the log's own zone. A time of day is the one within the log, whose first and last times are `span_ns`, or the nearest to it. For a
+/// log of local dates, `span_ns` is on its clock before [`in_zone`](crate::DriveLog::in_zone) and the result on the one after it, which
+/// is `zone_s` ahead of UTC.
 #[must_use]
 pub fn time_on_clock(word: &str, clock: Clock, span_ns: (i64, i64), zone_s: i64) -> Option<i64> {
     let word = word.trim();
@@ -124,7 +125,7 @@ pub fn time_on_clock(word: &str, clock: Clock, span_ns: (i64, i64), zone_s: i64)
         (None, Clock::Date | Clock::LocalDate | Clock::TimeOfDay) => {
             Some(of_local(nearest_day(time_of_day(word)?, span_ns)))
         }
-        // Some apps count the seconds of a day on, past midnight.
+        // Some apps continue counting the seconds of a day after midnight.
         (None, Clock::Free) if (DAY_NS / 2..DAY_NS).contains(&span_ns.0) => {
             Some(nearest_day(time_of_day(word)?, span_ns))
         }
@@ -132,7 +133,7 @@ pub fn time_on_clock(word: &str, clock: Clock, span_ns: (i64, i64), zone_s: i64)
     }
 }
 
-/// The moment at this time of a day that is within a span, or nearest to it: a log that begins before midnight has its video after it.
+/// The moment at this time of day that is within a span, or nearest to it: a log that begins before midnight may have its video after it.
 fn nearest_day(ns: i64, (first_ns, last_ns): (i64, i64)) -> i64 {
     let after = first_ns.saturating_add((ns - first_ns).rem_euclid(DAY_NS));
     let before = after.saturating_sub(DAY_NS);
@@ -143,7 +144,7 @@ fn nearest_day(ns: i64, (first_ns, last_ns): (i64, i64)) -> i64 {
     if late > early { before } else { after }
 }
 
-/// A written number of a unit, to the last digit: an f64 of seconds since 1970 has a quarter of a microsecond.
+/// A number with a unit, exact to the last digit: an f64 of seconds since 1970 is only exact to a quarter of a microsecond.
 fn number_ns(word: &str, unit_ns: i64) -> Option<i64> {
     let (negative, digits) = match word.strip_prefix('-') {
         Some(rest) => (true, rest),
@@ -165,8 +166,8 @@ fn number_ns(word: &str, unit_ns: i64) -> Option<i64> {
     Some(if negative { -value } else { value })
 }
 
-/// A date with a time of day as recorders write it (ISO 8601, or a form of some apps'): in nanoseconds since 1970, and whether it says its
-/// zone. Without one it is taken for UTC.
+/// A date with a time of day as recorders write it (ISO 8601, or a form used by some apps): nanoseconds since 1970, and whether it has a
+/// time zone. Without one it is taken as UTC.
 #[must_use]
 pub fn parse_date(word: &str) -> Option<(i64, bool)> {
     let word = word.trim();
@@ -178,7 +179,7 @@ pub fn parse_date(word: &str) -> Option<(i64, bool)> {
         let stamp = local.to_zoned(jiff::tz::TimeZone::UTC).ok()?.timestamp();
         Some((ns(stamp)?, false))
     };
-    // A date alone is no time.
+    // A date alone is not a time.
     if word.contains(':')
         && let Ok(local) = word.parse::<DateTime>()
     {
@@ -236,7 +237,7 @@ mod tests {
         assert_eq!(after - before, SECOND);
         let next = nanoseconds("00:00:01", style, Some(after)).unwrap();
         assert_eq!(next - after, SECOND / 2);
-        // A clock that steps back stays there.
+        // A clock that steps back by less is not moved to the next day.
         let back = nanoseconds("00:00:00", style, Some(after)).unwrap();
         assert_eq!(back - after, -SECOND / 2);
     }
@@ -336,7 +337,7 @@ mod tests {
             );
         }
         let utc = time_on_clock("12:00:00", Clock::Date, (noon, noon), zone_s);
-        assert_eq!(utc, Some(noon), "a clock that says its zone stays as it is");
+        assert_eq!(utc, Some(noon), "a date with a zone stays as it is");
     }
 
     #[test]

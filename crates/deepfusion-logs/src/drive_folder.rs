@@ -1,4 +1,4 @@
-//! A log beside its video or images, as a folder that every command reads: `speed.csv`, `imu.csv` or `course.csv`, `dataset.toml`.
+//! Writes a log with its video or images as a folder that every command reads: `speed.csv`, `imu.csv` or `course.csv`, `dataset.toml`.
 
 use crate::error::{Error, Result};
 use crate::log::{Clock, DriveLog, Speed};
@@ -8,49 +8,49 @@ use std::fmt::Write as _;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
-/// What a drive's folder is made of.
+/// The parts of a drive's folder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriveFolder<'a> {
-    /// Its speeds, and its turns where it has some.
+    /// The log of speeds, with turns if it has some.
     pub log: &'a DriveLog,
-    /// What saw it.
+    /// The video or images of the drive.
     pub media: Media,
-    /// The camera's calibration file, or its numbers.
+    /// The camera's calibration file, or its intrinsics.
     pub camera: Option<Camera>,
-    /// The moment of the first frame on the log's clock, in nanoseconds; without it the video's recorder or the frames' own times say it.
+    /// Time of the first frame on the log's clock, in nanoseconds; if `None`, the video's creation time or the frames' own times give it.
     pub start_ns: Option<i64>,
-    /// How far the camera's clock is ahead of the log's, in seconds, where it is known.
+    /// How far the camera's clock is ahead of the log's, in seconds, if it is known.
     pub camera_ahead_s: Option<f64>,
 }
 
-/// What saw a drive; the folder names it by its whole path, nothing is copied.
+/// The video or images of a drive. The folder refers to them by their absolute path; nothing is copied.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Media {
-    /// A video.
+    /// Path of a video.
     Video(PathBuf),
-    /// A folder of images.
+    /// Path of a folder of images.
     Images(PathBuf),
 }
 
-/// What says how the camera sees.
+/// How the camera is described.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Camera {
-    /// A calibration file.
+    /// Path of a calibration file.
     File(PathBuf),
     /// fx, fy, cx, cy in pixels.
     Intrinsics([f64; 4]),
-    /// The field of view from left to right, in degrees.
+    /// The horizontal field of view, in degrees.
     Hfov(f64),
 }
 
-/// Longest time from a log's beginning to its zero for which its zero is the first frame's.
+/// Longest time from a log's zero to its beginning for which its zero is taken as the first frame's time.
 const NEAR_START_NS: i64 = 5_000_000_000;
 
 impl DriveFolder<'_> {
-    /// What a folder may be made of, `dataset.toml` the last.
+    /// Files that a folder may contain, `dataset.toml` the last.
     pub const FILES: [&'static str; 4] = ["speed.csv", "imu.csv", "course.csv", "dataset.toml"];
 
-    /// Whether [`Self::write`] would write into a folder: the clocks are connected, and nothing of it is there yet.
+    /// Checks that [`Self::write`] would write into a folder: the clocks are connected, and none of its files exists yet.
     ///
     /// # Errors
     /// [`Error::NoStart`], [`Error::Exists`] as [`Self::write`].
@@ -66,11 +66,11 @@ impl DriveFolder<'_> {
         }
     }
 
-    /// Writes the folder, which is made where it is not there; the files in it, `dataset.toml` the last. Gives notes on what was taken for
-    /// granted.
+    /// Writes the folder's files, `dataset.toml` the last; the folder is created if it does not exist. Returns notes on what was
+    /// assumed.
     ///
     /// # Errors
-    /// [`Error::NoStart`] where nothing connects the log's clock with the video's; [`Error::Exists`] for a folder with files of these
+    /// [`Error::NoStart`] if nothing connects the log's clock with the video's; [`Error::Exists`] if the folder has files with these
     /// names; [`Error::File`].
     pub fn write(&self, out: &Path) -> Result<Vec<LogNote>> {
         self.check(out)?;
@@ -101,9 +101,9 @@ impl DriveFolder<'_> {
         Ok(notes)
     }
 
-    /// Has `measure` find how far the camera's clock is ahead of the log's, in seconds, and writes the folder with that. What it measures on is a
-    /// folder beside it under another name: stopped, whenever it may be, nothing looks finished. Frames that were decoded meanwhile lie where the
-    /// folder will be; where it was not there before and nothing was measured, they are removed with it.
+    /// Calls `measure` to find how far the camera's clock is ahead of the log's, in seconds, and writes the folder with that offset. It
+    /// measures on a folder beside it with another name, so that a run that is stopped leaves nothing that looks finished. Frames that
+    /// were decoded meanwhile are in the final folder; if that did not exist before and nothing was measured, they are removed with it.
     ///
     /// # Errors
     /// As [`Self::write`], and those of `measure`.
@@ -116,7 +116,7 @@ impl DriveFolder<'_> {
         // `.` has no name of its own.
         let whole = std::path::absolute(out).map_err(|e| Error::file(out, e))?;
         let trial = PartialFolder::beside(&whole).map_err(|e| Error::file(out, e))?;
-        // Of the drive's own name, which errors say.
+        // With the drive's own name, which errors contain.
         let name = whole.file_name().unwrap_or("drive".as_ref());
         let folder = trial.path().join(name);
         std::fs::create_dir(&folder).map_err(|e| Error::file(&folder, e))?;
@@ -132,7 +132,7 @@ impl DriveFolder<'_> {
         Ok(self.write(out)?)
     }
 
-    /// When the first frame was taken, where the log's clock or the user says it.
+    /// The time of the first frame, if the log's clock or the user gives it.
     fn start(&self) -> Result<(Option<i64>, Vec<LogNote>)> {
         if self.start_ns.is_some() {
             return Ok((self.start_ns, Vec::new()));
@@ -162,7 +162,7 @@ impl DriveFolder<'_> {
         match &self.media {
             Media::Video(video) => {
                 let _ = writeln!(text, "video = {}", quoted(&whole(video)?));
-                // The frames that are decoded from it belong to this folder, not beside somebody's video.
+                // The frames decoded from it belong in this folder, not beside a video that may be somebody else's.
                 let _ = writeln!(text, "cache = {}", quoted(&whole(out)?));
             }
             Media::Images(images) => {
@@ -191,7 +191,7 @@ impl DriveFolder<'_> {
     }
 }
 
-/// Puts the files of a folder, where there is one, into another: when its images were taken, or its calibration.
+/// Links the files of an existing folder into another: the images' times, or its calibration.
 fn link_files(from: &Path, to: &Path) -> Result<()> {
     let entries = match std::fs::read_dir(from) {
         Ok(entries) => entries,
@@ -204,7 +204,7 @@ fn link_files(from: &Path, to: &Path) -> Result<()> {
             continue;
         };
         let place = to.join(name);
-        // A video is not to be copied for it; file systems without links are rare.
+        // A video must not be copied for this; file systems without links are rare.
         let linked = std::fs::hard_link(&file, &place);
         let copied = linked.or_else(|_| std::fs::copy(&file, &place).map(|_| ()));
         copied.map_err(|e| Error::file(&file, e))?;
@@ -212,7 +212,7 @@ fn link_files(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Removes a folder that holds a video's decoded frames and nothing else. Another process may have filled it meanwhile: then all of it stays.
+/// Removes a folder that contains a video's decoded frames and nothing else. If another process has added files meanwhile, all of it stays.
 fn remove_frames(folder: &Path, video: &Path) {
     let video = video.file_name().unwrap_or_default().to_string_lossy();
     let begin = format!("{video}-");
@@ -227,12 +227,12 @@ fn remove_frames(folder: &Path, video: &Path) {
         for frames in found {
             let _ = std::fs::remove_dir_all(frames);
         }
-        // Not where there is anything by now.
+        // Fails if files were added by now.
         let _ = std::fs::remove_dir(folder);
     }
 }
 
-/// The table of speeds; with their standard deviations where every one has one.
+/// The table of speeds, with their standard deviations if all have one.
 fn speeds(readings: &[Speed]) -> String {
     let sure = readings.iter().all(|reading| reading.sigma_mps.is_some());
     let mut text = String::from("time_s,speed_mps");
@@ -262,7 +262,7 @@ fn quoted(path: &Path) -> String {
     text + "\""
 }
 
-/// Nanoseconds as seconds, to the last digit.
+/// Nanoseconds as seconds, exact to the last digit.
 fn seconds(ns: i64) -> String {
     let (sign, ns) = (if ns < 0 { "-" } else { "" }, ns.unsigned_abs());
     format!("{sign}{}.{:09}", ns / 1_000_000_000, ns % 1_000_000_000)
@@ -320,7 +320,11 @@ mod tests {
             let target = out.path().join(format!("{clock:?}-{first_ns}"));
             let written = folder(&log, None).write(&target);
             assert_eq!(written.is_ok(), fine, "{clock:?} {written:?}");
-            assert_eq!(target.exists(), fine, "nothing is left of a refused one");
+            assert_eq!(
+                target.exists(),
+                fine,
+                "a refused folder leaves nothing behind"
+            );
             let target = target.with_extension("said");
             folder(&log, Some(first_ns)).write(&target).unwrap();
         }
@@ -334,7 +338,7 @@ mod tests {
         assert!(error.contains("begin at 10:01:01, and"), "{error}");
     }
 
-    /// The table that is written says nothing of a zone any more.
+    /// The written table does not mention the time zone.
     #[test]
     fn dates_without_a_zone_are_said_to_be_taken_for_utc() {
         let out = tempfile::tempdir().unwrap();
@@ -371,7 +375,10 @@ mod tests {
         let stopped: Result<Vec<LogNote>> = drive.write_measured(&out, |trial| {
             let there = |name: &str| trial.join(name).is_file();
             assert!(there("frames.csv") && there("speed.csv") && there("dataset.toml"));
-            assert!(!out.join("dataset.toml").exists(), "it looks finished");
+            assert!(
+                !out.join("dataset.toml").exists(),
+                "the folder looks finished"
+            );
             Err(Error::NoStart {
                 first_ns: 0,
                 time_of_day: false,
@@ -413,7 +420,7 @@ mod tests {
         let frame = "a.mp4-0.frames/0000000000.jpg";
         refused_with(&[frame]);
         assert_eq!(std::fs::read_dir(at.path()).unwrap().count(), 0);
-        // Somebody's, or what another process wrote there.
+        // Files of a user, or written there by another process.
         for other in ["notes.txt", "dataset.toml.bak", "my.frames/0.jpg"] {
             refused_with(&[frame, other]);
             assert!(out.join(frame).is_file() && out.join(other).is_file());

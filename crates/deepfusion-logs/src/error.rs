@@ -2,97 +2,97 @@ use crate::problem::{BytesProblem, LineField, LineProblem, SignalProblem, SpeedP
 use deepfusion_hint::{Hint, system_hint};
 use std::path::{Path, PathBuf};
 
-/// What can be wrong with a log.
+/// Why a log cannot be read or used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A file could not be opened or read.
     #[error("{}: {source}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A line cannot be read.
     #[error("{}:{line}: {field}: {problem}", path.display())]
     Line {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The line, counted from 1.
         line: u64,
         /// The column, element or sentence.
         field: LineField,
-        /// What is wrong with it.
+        /// Why it cannot be read.
         problem: LineProblem,
     },
     /// Bytes of a binary log cannot be read.
     #[error("{}: byte {offset}: {field}: {problem}", path.display())]
     Bytes {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Where, counted from 0.
+        /// Position in the file, counted from 0.
         offset: u64,
         /// The box, key or object.
         field: &'static str,
-        /// What is wrong with it.
+        /// Why it cannot be read.
         problem: BytesProblem,
     },
-    /// Nothing says which column is meant, or none is there.
+    /// The column of times or speeds is missing or not known.
     #[error("{}: {problem}; its columns: {}", path.display(), columns.join(", "))]
     Column {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// What is wrong with the choice of a column.
         problem: ColumnProblem,
-        /// The header.
+        /// The headers of all columns.
         columns: Vec<String>,
     },
-    /// The log is of a kind that holds no speed, or of none that is known.
+    /// The log is of a kind without speeds, or has none that is known.
     #[error("{}: {problem}", path.display())]
     NoSpeed {
-        /// The file or folder.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// What was looked for.
+        /// Why it has no speed.
         problem: SpeedProblem,
     },
-    /// A camera's own track, which has no speed.
+    /// A camera's own track has no speed.
     #[error("{}: {why}", path.display())]
     NoGps {
-        /// The video.
+        /// Path of the video.
         path: PathBuf,
-        /// Why not.
+        /// Why it has no speed.
         why: NoGps,
     },
     /// A CAN trace without a signal to decode.
     #[error("{}: a CAN trace, and {problem}", path.display())]
     Signal {
-        /// The trace.
+        /// Path of the trace.
         path: PathBuf,
         /// What is missing.
         problem: SignalProblem,
     },
     /// Nothing connects the log's clock with the video's.
-    #[error("the log's times begin at {}, and nothing says when on that clock the video began", begun(*first_ns, *time_of_day))]
+    #[error("the log's times begin at {}, and it is not known when the video began on that clock", begun(*first_ns, *time_of_day))]
     NoStart {
-        /// The log's first time.
+        /// The log's first time, in nanoseconds.
         first_ns: i64,
-        /// Whether it counts from a midnight.
+        /// Whether its times count from midnight.
         time_of_day: bool,
     },
-    /// A file would be written over.
+    /// A file would be overwritten.
     #[error("{}: already exists", path.display())]
     Exists {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// Logs whose clocks have nothing to do with each other.
-    #[error("{}: its clock is of another kind than the first log's", path.display())]
+    /// The clocks of two logs cannot be related.
+    #[error("{}: its clock is of a different kind from the first log's", path.display())]
     OtherClock {
-        /// The second log.
+        /// Path of the second log.
         path: PathBuf,
     },
-    /// A DBC file or a signal of it cannot be used.
+    /// A DBC file or one of its signals cannot be used.
     #[error(transparent)]
     Motion(#[from] deepfusion_motion::Error),
 }
@@ -101,10 +101,10 @@ pub enum Error {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoGps {
-    /// It has no GPS at all.
-    #[error("its metadata holds no GPS: it was switched off")]
+    /// The video has no GPS data.
+    #[error("its metadata has no GPS data: the GPS was switched off")]
     SwitchedOff,
-    /// It has one without a fix.
+    /// The video has GPS data without a fix.
     #[error("the camera's GPS never had a fix")]
     NoFix,
 }
@@ -113,7 +113,7 @@ pub enum NoGps {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColumnProblem {
-    /// A column that was asked for by name is not there.
+    /// A column that was asked for by name is missing.
     #[error("no column '{0}'")]
     Missing(String),
     /// No column looks like a time.
@@ -122,11 +122,11 @@ pub enum ColumnProblem {
     /// No column looks like a speed, and there are no positions.
     #[error("no column looks like a speed, and none like latitude and longitude")]
     NoSpeed,
-    /// The speed's unit is not said.
-    #[error("nothing says the unit of the speed in column '{0}'")]
+    /// The speed's unit is not known.
+    #[error("the unit of the speed in column '{0}' is not known")]
     NoSpeedUnit(String),
-    /// The time's unit is not said.
-    #[error("nothing says the unit of the time in column '{0}'")]
+    /// The time's unit is not known.
+    #[error("the unit of the time in column '{0}' is not known")]
     NoTimeUnit(String),
 }
 
@@ -135,17 +135,17 @@ impl Hint for Error {
         let text = match self {
             Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
             Self::Motion(error) => return error.hint(),
-            Self::Line { .. } => "correct the line or delete it, or export the log anew",
+            Self::Line { .. } => "correct the line or delete it, or export the log again",
             Self::Bytes { .. } => "copy the file again from where it was recorded",
             Self::Column { problem, .. } => return problem.hint(),
             Self::NoSpeed { .. } | Self::NoGps { .. } => {
                 "GPX, NMEA, tables with a header, phones' export folders, GoPro's videos and CAN traces are read"
             }
-            Self::Signal { .. } => "give the DBC file, and the speed's signal as Message.Signal",
-            Self::NoStart { .. } => "say when the first frame was taken, on the log's clock",
-            Self::Exists { .. } => "choose another folder, or take the file away",
+            Self::Signal { .. } => "give the DBC file and the speed's signal, as Message.Signal",
+            Self::NoStart { .. } => "give the time of the first frame on the log's clock",
+            Self::Exists { .. } => "choose another folder, or remove the file",
             Self::OtherClock { .. } => {
-                "give the log that has both speeds and turns, or the first alone"
+                "give one log with both speeds and turns, or the first log alone"
             }
         };
         Some(text.to_owned())
@@ -154,7 +154,7 @@ impl Hint for Error {
 
 impl Hint for NoGps {
     fn hint(&self) -> Option<String> {
-        Some("switch the camera's GPS on and wait for its fix, or give another log".into())
+        Some("switch on the camera's GPS and wait for a fix, or give another log".into())
     }
 }
 
@@ -162,11 +162,11 @@ impl Hint for ColumnProblem {
     fn hint(&self) -> Option<String> {
         let text = match self {
             Self::NoSpeedUnit(_) => {
-                "say the unit of speed (m/s, km/h, mph, knots): a wrong one would scale every depth"
+                "give the unit of speed (m/s, km/h, mph, knots): a wrong one would scale every depth"
             }
             Self::NoTimeUnit(_) => "name the column time_s, time_ms, time_us or time_ns",
             Self::Missing(_) | Self::NoTime | Self::NoSpeed => {
-                "say which column is the time and which the speed, by their names in the header"
+                "name the columns of time and speed as they are in the header"
             }
         };
         Some(text.to_owned())
@@ -176,14 +176,14 @@ impl Hint for ColumnProblem {
 /// A log's first time, as its clock shows it.
 fn begun(first_ns: i64, time_of_day: bool) -> String {
     if !time_of_day {
-        return format!("{} s of a clock of their own", first_ns as f64 * 1e-9);
+        return format!("{} s on a clock of their own", first_ns as f64 * 1e-9);
     }
     let s = first_ns.div_euclid(1_000_000_000);
     let (hours, minutes) = (s.div_euclid(3600), s.rem_euclid(3600) / 60);
     format!("{hours:02}:{minutes:02}:{:02}", s.rem_euclid(60))
 }
 
-/// What the crate's functions give back.
+/// Result of the crate's functions.
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
@@ -195,7 +195,7 @@ impl Error {
     }
 }
 
-/// What is wrong in a text, before the file's name is known.
+/// What is wrong with a line, before the file's name is known.
 pub(crate) struct BadLine {
     pub(crate) line: u64,
     pub(crate) field: LineField,

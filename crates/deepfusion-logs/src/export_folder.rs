@@ -1,4 +1,4 @@
-//! A phone's export folder: a table for each sensor, as Sensor Logger and phyphox write them.
+//! A phone's export folder: a table per sensor, as Sensor Logger and phyphox write them.
 
 use crate::error::{Error, Result};
 use crate::log::{DriveLog, Format, ReadOptions};
@@ -11,7 +11,7 @@ use crate::wide_table::{self, Times};
 use nalgebra::Vector3;
 use std::path::Path;
 
-/// Files of positions, the better first.
+/// Files of positions, in order of preference.
 static LOCATIONS: [&str; 4] = [
     "LocationGps.csv",
     "Location.csv",
@@ -19,7 +19,7 @@ static LOCATIONS: [&str; 4] = [
     "Location (GPS).csv",
 ];
 const GYROSCOPES: [&str; 2] = ["Gyroscope.csv", "Gyroscope rotation rate.csv"];
-/// Accelerations with gravity, the better first.
+/// Accelerations with gravity, in order of preference.
 const GRAVITIES: [&str; 5] = [
     "Gravity.csv",
     "TotalAcceleration.csv",
@@ -60,7 +60,7 @@ pub(crate) fn read(folder: &Path, options: &ReadOptions) -> Result<DriveLog> {
     Ok(log)
 }
 
-/// What is said of one of the folder's tables.
+/// A note on one of the folder's tables.
 fn of_file(table: &Table, note: LogNote) -> LogNote {
     let name = table.path.file_name().unwrap_or_default();
     LogNote::OfFile {
@@ -69,8 +69,8 @@ fn of_file(table: &Table, note: LogNote) -> LogNote {
     }
 }
 
-/// The three axes of a sensor over time, in the units of the file: rad/s, m/s². Their times are in the column that was asked for where there is
-/// such, and on the positions' clock: that of `log`, which has a note where rows are left out.
+/// The three axes of a sensor over time, in the units of the file: rad/s, m/s². Their times are in the requested column if the table has
+/// it, and on the positions' clock: that of `log`, which gets a note if rows are left out.
 fn axes(table: &Table, options: &ReadOptions, log: &mut DriveLog) -> Result<Vec<Sensor>> {
     let asked = options.time.clone();
     let times = Times::of(
@@ -121,12 +121,12 @@ fn axes(table: &Table, options: &ReadOptions, log: &mut DriveLog) -> Result<Vec<
     let readings = rows.into_iter();
     let readings = readings.map(|(ns, (_, value))| Sensor { ns, value });
     let mut all: Vec<Sensor> = readings.collect();
-    // Of rows of one moment the first.
+    // The first of several rows with the same time.
     all.dedup_by_key(|reading| reading.ns);
     Ok(all)
 }
 
-/// The directions of travel that the satellites saw, while the vehicle was fast enough to have one.
+/// The directions of travel that the satellites gave, while the vehicle was fast enough to have one.
 fn headings(table: &Table, options: &ReadOptions) -> Result<Vec<Heading>> {
     let bearing = table.named(&["bearing", "direction", "course", "heading"]);
     let (Some(bearing), Some(speed)) = (
@@ -146,7 +146,7 @@ fn headings(table: &Table, options: &ReadOptions) -> Result<Vec<Heading>> {
     }
     let mut astray = Astray::default();
     let rows = times.in_order(table, rows, &mut astray)?;
-    // The speeds of these rows have notes of their own.
+    // The speeds of these rows have their own notes.
     astray.notes(rows.len())?;
     // Below a brisk walk the course of a receiver is noise.
     let is_known = |(degrees, speed): (f64, f64)| speed > 3.0 && degrees >= 0.0;

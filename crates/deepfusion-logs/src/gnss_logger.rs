@@ -1,4 +1,4 @@
-//! The text of Google's GnssLogger: rows of several kinds, each kind's columns in a comment; `Fix` rows hold the speed.
+//! The text format of Google's GnssLogger: rows of several kinds, with each kind's columns in a comment; `Fix` rows hold the speed.
 
 use crate::error::{BadLine, Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed};
@@ -11,13 +11,13 @@ use std::path::Path;
 
 const HEADER: &str = "# Fix,";
 
-/// Whether a text is one.
+/// Whether a text has this format.
 pub(crate) fn is_one(text: &str) -> bool {
     let mut lines = text.lines().take(1000);
     lines.any(|l| l.starts_with(HEADER) || l.starts_with("Fix,"))
 }
 
-/// The speeds of the `Fix` rows, those of satellites alone where there are some: others are mixed from networks.
+/// The speeds of the `Fix` rows. If some come from GPS alone, only these are read: the others are fused with network positions.
 pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
     let header = text.lines().find_map(|l| l.strip_prefix(HEADER));
     let columns: Vec<String> = header
@@ -25,7 +25,7 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
         .split(',')
         .map(|c| c.trim().to_lowercase())
         .collect();
-    // Older versions wrote other names.
+    // Older versions used other names.
     let find = |names: [&'static str; 2]| {
         let place = columns.iter().position(|c| names.contains(&c.as_str()));
         place.ok_or_else(|| Error::NoSpeed {
@@ -95,7 +95,7 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
     let of_order = astray.notes(in_order.len())?;
     let used = in_order.len();
     let mut speeds: Vec<Speed> = in_order.into_iter().map(|(_, (_, speed))| speed).collect();
-    // Of fixes of one moment the first.
+    // The first of several fixes with the same time.
     speeds.dedup_by_key(|speed| speed.ns);
     let repeated = used - speeds.len();
     let mut notes = vec![LogNote::from(FixesNote::FixRows {

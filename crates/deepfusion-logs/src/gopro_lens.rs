@@ -1,4 +1,4 @@
-//! Which of its lenses a GoPro filmed through, as HERO8 and newer write it once into a video's `moov/udta`: the names are those of
+//! Which of its lenses a GoPro used, as HERO8 and newer write it once into a video's `moov/udta`. The names are those of
 //! github.com/gopro/gpmf-parser and of ExifTool's tables.
 
 use crate::error::{Error, Result};
@@ -6,29 +6,29 @@ use crate::gpmf::{Entry, entries};
 use crate::mp4::{Broken, udta};
 use std::path::Path;
 
-/// What a GoPro's video says of how it was filmed.
+/// Lens settings in a GoPro's video.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GoproLens {
     /// The camera (`MINF`): "HERO11 Black".
     pub model: String,
     /// The digital lens (`VFOV`), a letter: `L` linear, `N` narrow, `W` wide, `S` SuperView, `H` HyperView, `M` max.
     pub digital: char,
-    /// What it sees from corner to corner (`ZFOV`), in degrees.
+    /// Diagonal field of view (`ZFOV`), in degrees.
     pub diagonal_deg: f64,
-    /// Width and height of the video as it was taken (`VRES`), in pixels.
+    /// Width and height of the video as it was recorded (`VRES`), in pixels.
     pub size: (u32, u32),
-    /// Whether the picture was zoomed into (`DZST` above 0; `DZOM` only says that it could have been).
+    /// Whether the picture was zoomed (`DZST` above 0; `DZOM` only says that it could have been).
     pub zoomed: bool,
 }
 
 impl GoproLens {
-    /// What a video says of its lens; `None` where it does not say all of it, as other cameras' videos and those of older or edited ones.
+    /// Reads a video's lens settings; `None` if some are missing, as in other cameras' videos and in older or edited ones.
     ///
     /// # Errors
     /// [`Error::File`]; [`Error::Bytes`] for a video that is cut off or damaged.
     pub fn read(video: &Path) -> Result<Option<Self>> {
         let file = std::fs::File::open(video).map_err(|e| Error::file(video, e))?;
-        // SAFETY: the file is only read; whoever cuts it meanwhile gets an error of the system's, as with every mapped file.
+        // SAFETY: the file is only read. Truncating it meanwhile gives an error of the system's, as with every mapped file.
         let bytes = unsafe { memmap2::Mmap::map(&file) }.map_err(|e| Error::file(video, e))?;
         Self::find(&bytes).map_err(|broken| broken.of(video))
     }
@@ -42,14 +42,14 @@ impl GoproLens {
         Ok(fields.whole())
     }
 
-    /// Whether its pictures are those of a pinhole: straight lines stay straight.
+    /// Whether its pictures are those of a pinhole camera: straight lines stay straight.
     #[must_use]
     pub fn is_linear(&self) -> bool {
         self.digital == 'L'
     }
 
     /// Focal length of the linear lens in a video of this size, in pixels: half the diagonal over the tangent of half the angle. `None` for
-    /// other lenses, for a video that was zoomed or cut to another shape, and for an angle that is none.
+    /// other lenses, for a video that was zoomed or cropped to another shape, and for an impossible angle.
     #[must_use]
     pub fn focal_px(&self, (width, height): (u32, u32)) -> Option<f64> {
         let shape = |(w, h): (u32, u32)| f64::from(w.max(h)) / f64::from(w.min(h).max(1));
@@ -63,10 +63,10 @@ impl GoproLens {
     }
 }
 
-/// How far a video's shape may be from the one it was taken with, as a share: encoders cut sides to multiples of 16.
+/// How far a video's aspect ratio may be from the recorded one, as a share: encoders crop sides to multiples of 16.
 const SAME_SHAPE: f64 = 0.02;
 
-/// Levels of entries within entries: devices, and the streams of one; a damaged file may claim any number.
+/// Levels of nested entries: devices, and the streams of one. A damaged file may claim any number.
 const DEEPEST: usize = 3;
 
 /// What was found so far.
@@ -80,7 +80,7 @@ struct LensFields {
 }
 
 impl LensFields {
-    /// Whatever is in the entries, and in those within them, `deep` levels down.
+    /// Reads the entries, and those nested in them, `deep` levels down.
     fn add(&mut self, all: &[Entry<'_>], deep: usize) -> std::result::Result<(), Broken> {
         for entry in all {
             match &entry.key {

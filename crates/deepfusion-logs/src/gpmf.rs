@@ -1,4 +1,4 @@
-//! GoPro's metadata: a track of its own in the video, of keys, lengths and values. Times need no clock: each payload belongs to about a
+//! GoPro's metadata: a separate track of the video with keys, lengths and values. Its times need no clock: each payload belongs to about a
 //! second of the video, over which its readings are spread evenly.
 
 use crate::error::{Error, NoGps, Result};
@@ -10,18 +10,18 @@ use crate::turns::{Heading, Sensor, yaw_rates};
 use nalgebra::Vector3;
 use std::path::Path;
 
-/// One key with what belongs to it.
+/// One key with its data.
 pub(crate) struct Entry<'a> {
     pub(crate) key: [u8; 4],
     kind: u8,
-    /// Bytes of one reading.
+    /// Size of one reading, in bytes.
     size: usize,
     pub(crate) value: &'a [u8],
-    /// In the file.
+    /// Position in the file.
     pub(crate) offset: usize,
 }
 
-/// What all payloads hold.
+/// The readings of all payloads.
 #[derive(Default)]
 struct Readings {
     speeds: Vec<Speed>,
@@ -32,10 +32,10 @@ struct Readings {
     without_fix: usize,
 }
 
-/// Reads the speeds of the camera's receiver and the turns of its gyroscope.
+/// Reads the speeds of the camera's GPS receiver and the turns of its gyroscope.
 pub(crate) fn read(path: &Path) -> Result<DriveLog> {
     let file = std::fs::File::open(path).map_err(|e| Error::file(path, e))?;
-    // SAFETY: the file is only read; whoever cuts it meanwhile gets an error of the system's, as with every mapped file.
+    // SAFETY: the file is only read. Truncating it meanwhile gives an error of the system's, as with every mapped file.
     let bytes = unsafe { memmap2::Mmap::map(&file) }.map_err(|e| Error::file(path, e))?;
     let broken = |broken: Broken| broken.of(path);
     let Some(payloads) = samples(&bytes, b"gpmd").map_err(broken)? else {
@@ -163,8 +163,8 @@ impl Readings {
         }
         for (key, into) in [(b"GYRO", 0), (b"GRAV", 1), (b"ACCL", 2)] {
             let Some(entry) = find(key) else { continue };
-            // Which axes of the camera the three are differs between models (ORIN), but it is the same order of all three sensors
-            // where one chip holds gyroscope and accelerometer; GRAV has an order of its own, and is read where ACCL is absent.
+            // Which axes of the camera the three are differs between models (ORIN). If one chip holds gyroscope and accelerometer, both
+            // have the same order. GRAV has an order of its own, and is used if ACCL is absent.
             let rows = rows(entry, 3)?;
             let readings = rows.iter().enumerate().map(|(i, row)| Sensor {
                 ns: at(i, rows.len()),
@@ -192,7 +192,7 @@ impl Readings {
     }
 }
 
-/// The course between places a second apart, while the vehicle moved.
+/// The course between positions a second apart, while the vehicle moved.
 fn courses(places: &[(i64, f64, f64)], speeds: &[Speed]) -> Vec<Heading> {
     let (mut all, mut from) = (Vec::new(), 0);
     for (i, (ns, latitude, longitude)) in places.iter().enumerate() {
@@ -214,7 +214,7 @@ fn courses(places: &[(i64, f64, f64)], speeds: &[Speed]) -> Vec<Heading> {
     all
 }
 
-/// The entries of a stretch of keys, lengths and values; each is padded to four bytes.
+/// The entries of a range of keys, lengths and values; each is padded to four bytes.
 pub(crate) fn entries(bytes: &[u8], base: usize) -> std::result::Result<Vec<Entry<'_>>, Broken> {
     let (mut all, mut at) = (Vec::new(), 0);
     while at + 8 <= bytes.len() {
@@ -249,7 +249,7 @@ pub(crate) fn entries(bytes: &[u8], base: usize) -> std::result::Result<Vec<Entr
     Ok(all)
 }
 
-/// Bytes of a number of a kind, and its value.
+/// Size in bytes of a number of a type, and its value.
 fn number(kind: u8, bytes: &[u8]) -> Option<f64> {
     fn take<const N: usize>(bytes: &[u8]) -> Option<[u8; N]> {
         bytes.get(..N)?.try_into().ok()
@@ -289,19 +289,19 @@ impl Entry<'_> {
         }
     }
 
-    /// Whether its value is entries again.
+    /// Whether its value consists of further entries.
     pub(crate) fn is_nest(&self) -> bool {
         self.kind == 0
     }
 
-    /// Its value as a text, without what pads it; `None` for one of numbers.
+    /// Its value as text, without padding; `None` for numbers.
     pub(crate) fn text(&self) -> Option<String> {
         let text = String::from_utf8_lossy(self.value);
         let text = text.trim_matches(|c: char| c == '\0' || c.is_whitespace());
         matches!(self.kind, b'c' | b'F').then(|| text.to_owned())
     }
 
-    /// All numbers of an entry of one kind.
+    /// All numbers of an entry with a single type.
     pub(crate) fn numbers(&self) -> std::result::Result<Vec<f64>, Broken> {
         let Some(width) = width(self.kind) else {
             let kind = char::from(self.kind);
@@ -314,7 +314,7 @@ impl Entry<'_> {
             .collect())
     }
 
-    /// The readings of at least `least` numbers each; `complex` is the list of kinds of an entry of kind '?'.
+    /// The readings, of at least `least` numbers each; `complex` is the list of types of an entry of type '?'.
     fn rows(
         &self,
         complex: Option<&[u8]>,

@@ -16,10 +16,10 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
     log_of_fixes(path, Format::Gpx, &fixes)
 }
 
-/// The points of all tracks of a GPX file (1.0 and 1.1) that have a time; a speed in m/s, of the point or of an extension.
+/// The points of all tracks of a GPX file (1.0 and 1.1) that have a time, with a speed in m/s from the point or an extension.
 fn fixes(bytes: &[u8]) -> std::result::Result<Vec<TimedFix>, BadLine> {
     let mut reader = Reader::from_reader(bytes);
-    // Lines are counted on from the event before: a track has millions of events.
+    // Lines are counted from the previous event: a track has millions of events.
     let (mut line, mut counted) = (1, 0);
     let (mut fixes, mut point, mut text, mut known) = (Vec::new(), None, String::new(), false);
     loop {
@@ -113,7 +113,7 @@ fn date(word: &str, line: u64) -> std::result::Result<i64, BadLine> {
     i64::try_from(stamp.as_nanosecond()).map_err(|_| bad(GpxProblem::TooLate { text: text() }))
 }
 
-/// A speed in m/s; a negative one, as iOS writes it, is not known.
+/// A speed in m/s; a negative one, as iOS writes it, means unknown.
 fn speed(word: &str, line: u64) -> std::result::Result<Option<f64>, BadLine> {
     let value: Option<f64> = word.parse().ok();
     let value = value.filter(|v| v.is_finite() && *v < 200.0);

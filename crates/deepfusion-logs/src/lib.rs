@@ -1,20 +1,20 @@
-//! A vehicle's speed over time, from the log that happens to be there.
+//! A vehicle's speed over time, from whatever log was recorded.
 //!
-//! [`read`] takes a file or an app's export folder, and finds out what it is by what stands in it. It gives a [`DriveLog`]: speeds
-//! in m/s at times in nanoseconds, yaw rates where the log has a gyroscope, and [notes](DriveLog::notes) that say how it was
-//! understood. What would change the scale is never guessed: a speed without a unit is an error that lists the columns.
+//! [`read`] takes a file or an app's export folder, and recognises the format from the content. It returns a [`DriveLog`]: speeds
+//! in m/s at times in nanoseconds, yaw rates if the log has a gyroscope, and [notes](DriveLog::notes) that say how it was
+//! interpreted. Nothing that changes the scale is guessed: a speed without a unit is an error that lists the columns.
 //!
 //! | Log | Read by |
 //! |---|---|
-//! | GPX, NMEA | Doppler speed where most fixes have one, else positions, smoothed |
+//! | GPX, NMEA | Doppler speed if most fixes have one, else smoothed positions |
 //! | Tables (`.csv`, `.tsv`, `.txt`): Torque, Sensor Logger, phyphox, any other | names and units of the columns |
 //! | Car Scanner (one value a row) | the rows of the vehicle's speed |
 //! | Google's GnssLogger | its `Fix` rows |
 //! | GoPro's MP4 | the `gpmd` track: GPS5 or GPS9, gyroscope and gravity |
 //! | `candump`, Vector ASC and BLF | a signal of a DBC file |
 //!
-//! [`DriveFolder`] writes a log beside its video as a folder that every command reads. Nothing here knows of images; [`GoproLens`] is what else a GoPro
-//! writes into its videos.
+//! [`DriveFolder`] writes a log with its video as a folder that every command reads. This crate does not read images; [`GoproLens`]
+//! reads the lens settings in a GoPro's video.
 
 mod blf;
 mod can_trace;

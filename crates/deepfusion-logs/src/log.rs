@@ -2,26 +2,26 @@ use crate::{LogNote, SpeedUnit};
 use std::fmt;
 use std::path::PathBuf;
 
-/// What a log says of how its vehicle moved.
+/// How a vehicle moved, read from a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriveLog {
-    /// What kind of log it was.
+    /// Format of the log.
     pub format: Format,
-    /// From when its times count.
+    /// The clock of its times.
     pub clock: Clock,
-    /// In the order of their times, no two at one time.
+    /// Speeds, in the order of their times; no two have the same time.
     pub speeds: Vec<Speed>,
-    /// In the order of their times; empty where nothing measured them. They have times of their own.
+    /// Yaw rates, in the order of their own times; empty if none were measured.
     pub yaw_rates: Vec<YawRate>,
-    /// How the course over ground turned, by positions, where the vehicle moved; in the order of their times, spread over a
-    /// second or so. Enough to tell how far two clocks are apart, not how a camera turned from one image to the next.
+    /// Yaw rates of the course over ground, from positions while the vehicle moved. In the order of their times, and smoothed over a
+    /// second or so: enough to find the offset of two clocks, but not how a camera turned from one image to the next.
     pub course_rates: Vec<YawRate>,
-    /// How the log was understood, and what of it was left out.
+    /// How the log was interpreted, and what was left out.
     pub notes: Vec<LogNote>,
 }
 
 impl DriveLog {
-    /// The same with the zone of its local dates said: `ahead_s` seconds ahead of UTC. Logs of another clock stay as they are.
+    /// The same log with the time zone of its local dates: `ahead_s` seconds ahead of UTC. Logs with another clock stay as they are.
     #[must_use]
     pub fn in_zone(mut self, ahead_s: i64) -> Self {
         if self.clock == Clock::LocalDate {
@@ -36,59 +36,59 @@ impl DriveLog {
     }
 }
 
-/// A speed.
+/// A speed at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Speed {
-    /// On the log's clock, in nanoseconds.
+    /// Time on the log's clock, in nanoseconds.
     pub ns: i64,
-    /// In m/s; negative backwards, where the log knows.
+    /// Speed in m/s; negative backwards, if the log tells the direction.
     pub mps: f64,
-    /// Its standard deviation in m/s, where something tells it.
+    /// Standard deviation of the speed in m/s, if it is known.
     pub sigma_mps: Option<f64>,
 }
 
-/// A rate of turning about the axis that points up.
+/// A rate of rotation about the axis that points up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct YawRate {
-    /// On the log's clock, in nanoseconds.
+    /// Time on the log's clock, in nanoseconds.
     pub ns: i64,
-    /// In rad/s, positive to the left.
+    /// Rate in rad/s, positive to the left.
     pub radps: f64,
 }
 
-/// From when times count.
+/// The time from which a log's times count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clock {
-    /// From the beginning of 1970, UTC.
+    /// The beginning of 1970, UTC.
     Date,
-    /// From the beginning of 1970 of a local clock: hours may be added to UTC.
+    /// The beginning of 1970 on a local clock: UTC may be some hours off.
     LocalDate,
-    /// From a midnight.
+    /// Midnight.
     TimeOfDay,
-    /// From some moment of the recorder's own.
+    /// A moment chosen by the recorder.
     Free,
-    /// From the first frame of the video that the log was taken out of.
+    /// The first frame of the video that contains the log.
     Video,
 }
 
-/// Kinds of logs.
+/// Formats of logs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// A GPS track as XML.
     Gpx,
-    /// A receiver's sentences.
+    /// A receiver's NMEA sentences.
     Nmea,
-    /// A table with a column for each quantity.
+    /// A table with a column per quantity.
     Table,
-    /// A table with one value a row, as Car Scanner writes it.
+    /// A table with one value per row, as Car Scanner writes it.
     TallTable,
-    /// A phone's export: a folder of tables, one for each sensor.
+    /// A phone's export: a folder with a table per sensor.
     ExportFolder,
-    /// The text of Google's GnssLogger.
+    /// The text format of Google's GnssLogger.
     GnssLogger,
     /// The metadata track of a GoPro's video.
     Gpmf,
-    /// CAN frames, and a DBC file.
+    /// CAN frames with a DBC file.
     CanTrace,
 }
 
@@ -107,21 +107,21 @@ impl fmt::Display for Format {
     }
 }
 
-/// What a user says of a log, where it does not say it itself.
+/// What a user says about a log that does not say it itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ReadOptions {
-    /// The column of times, by its header.
+    /// Header of the column of times.
     pub time: Option<String>,
-    /// The column of speeds by its header; of a tall table the name of its rows; of a CAN trace the signal, "Message.Signal".
+    /// Header of the column of speeds; for a tall table the name of its rows, for a CAN trace the signal, "Message.Signal".
     pub speed: Option<String>,
-    /// The speeds' unit, where nothing else says it; what the log says counts before it.
+    /// Unit of the speeds, if the log does not give one; the log's own unit takes precedence.
     pub unit: Option<SpeedUnit>,
-    /// A DBC file, for CAN traces.
+    /// Path of a DBC file, for CAN traces.
     pub dbc: Option<PathBuf>,
 }
 
 impl ReadOptions {
-    /// The same, with columns by their usual names.
+    /// The same options with columns by their usual names.
     pub(crate) fn without_columns(&self) -> Self {
         Self {
             time: None,

@@ -1,4 +1,4 @@
-//! As much of MP4 as it takes to get at a track of metadata: where its samples lie, and when each begins.
+//! A minimal MP4 reader for tracks of metadata: the positions and times of a track's samples.
 
 use crate::error::Error;
 use crate::problem::{BytesProblem, Mp4Problem};
@@ -8,9 +8,9 @@ use std::path::Path;
 /// A sample of a track.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Sample {
-    /// Its bytes in the file.
+    /// Range of its bytes in the file.
     pub(crate) bytes: Range<usize>,
-    /// When it begins and ends, in nanoseconds from the track's beginning.
+    /// Its beginning and end, in nanoseconds from the track's beginning.
     pub(crate) ns: Range<i64>,
 }
 
@@ -22,7 +22,7 @@ pub(crate) struct Broken {
 }
 
 impl Broken {
-    /// As an error of a file.
+    /// Converts it to an error about a file.
     pub(crate) fn of(self, path: &Path) -> Error {
         Error::Bytes {
             path: path.to_owned(),
@@ -33,13 +33,13 @@ impl Broken {
     }
 }
 
-/// A box: what stands in it, as a range of the file.
+/// A box, with its content as a range of the file.
 struct BoxContent<'a> {
     file: &'a [u8],
     range: Range<usize>,
 }
 
-/// What a movie's user data hold under a name; `None` where the file is no movie or holds nothing of the kind.
+/// A movie's user data of one kind; `None` if the file is not a movie or has no such data.
 pub(crate) fn udta(file: &[u8], kind: &[u8; 4]) -> Result<Option<Range<usize>>, Broken> {
     let whole = BoxContent {
         file,
@@ -72,7 +72,7 @@ pub(crate) fn samples(file: &[u8], format: &[u8; 4]) -> Result<Option<Vec<Sample
         let Some(description) = table.first(b"stsd")? else {
             continue;
         };
-        // Version and flags, how many, the size of the first, its format.
+        // Version and flags, number of entries, size of the first, its format.
         if description.bytes(12, 4)? != format {
             continue;
         }
@@ -114,7 +114,7 @@ impl BoxContent<'_> {
         Ok(u64::from(self.u32(at)?) << 32 | u64::from(self.u32(at + 4)?))
     }
 
-    /// The boxes in this one of a kind.
+    /// The boxes of one kind in this one.
     fn all(&self, kind: &[u8; 4]) -> Result<Vec<BoxContent<'_>>, Broken> {
         let (mut found, mut at) = (Vec::new(), 0);
         let length = self.range.len();
@@ -172,7 +172,7 @@ impl BoxContent<'_> {
         Ok(Some(at))
     }
 
-    /// Ticks a second of a media header.
+    /// Ticks per second of a media header.
     fn timescale(&self) -> Result<u32, Broken> {
         let at = if self.bytes(0, 1)?[0] == 1 { 20 } else { 12 };
         match self.u32(at)? {
@@ -181,7 +181,7 @@ impl BoxContent<'_> {
         }
     }
 
-    /// The samples of a sample table: their sizes, the chunks they lie in, how long each lasts.
+    /// The samples of a sample table: their sizes, the chunks they lie in, their durations.
     fn samples(&self, scale: u32) -> Result<Vec<Sample>, Broken> {
         let needed = |kind: &'static [u8; 4], name| {
             self.first(kind)?
@@ -194,7 +194,7 @@ impl BoxContent<'_> {
         );
         let count = sizes.u32(8)? as usize;
         let one_size = sizes.u32(4)?;
-        // Each sample takes a byte of the file at least, so a count cannot ask for more memory than the file has.
+        // Each sample takes at least one byte of the file, so a count cannot demand more memory than the file's size.
         if count > self.file.len() {
             return Err(sizes.broken("stsz", Mp4Problem::Samples));
         }
@@ -215,11 +215,11 @@ impl BoxContent<'_> {
         };
         let chunks = offsets.u32(4)? as usize;
         let mut begins = durations.starts(scale)?;
-        // What is there is read before memory is asked for the rest.
+        // The existing entries are read before memory is reserved for the rest.
         let (mut samples, mut run) = (Vec::new(), 0);
         let runs_count = runs.u32(4)? as usize;
         for chunk in 0..chunks {
-            // A run says from which chunk on (counted from 1) a chunk has so many samples.
+            // A run gives the first chunk (counted from 1) from which on each chunk has this many samples.
             while run + 1 < runs_count && runs.u32(8 + 12 * (run + 1))? as usize <= chunk + 1 {
                 run += 1;
             }
@@ -247,7 +247,7 @@ impl BoxContent<'_> {
         Ok(samples)
     }
 
-    /// When each sample begins and ends.
+    /// Beginning and end of each sample.
     fn starts(&self, scale: u32) -> Result<impl Iterator<Item = Range<i64>>, Broken> {
         let mut entries = Vec::new();
         for entry in 0..self.u32(4)? as usize {

@@ -1,4 +1,4 @@
-//! How a log was understood, and what of it was left out.
+//! How a log was interpreted, and what was left out.
 
 mod can;
 mod clock;
@@ -14,7 +14,7 @@ pub use self::gopro::GoproNote;
 pub use self::table::TableNote;
 pub use self::turns::{TurnSign, TurnsNote};
 
-/// How a log was understood, or what of it was left out.
+/// How a log was interpreted, or what was left out.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogNote {
@@ -30,18 +30,18 @@ pub enum LogNote {
     /// A GoPro's video.
     #[error(transparent)]
     Gopro(#[from] GoproNote),
-    /// A gyroscope of which nobody knows how it is mounted.
+    /// A gyroscope whose mounting is unknown.
     #[error(transparent)]
     Turns(#[from] TurnsNote),
-    /// How the log's clock is connected with the video's.
+    /// How the log's clock is related to the video's.
     #[error(transparent)]
     Clock(#[from] ClockNote),
     /// One file of a folder.
     #[error("{file}: {note}")]
     OfFile {
-        /// The file's name.
+        /// Name of the file.
         file: String,
-        /// How it was understood.
+        /// How the file was interpreted.
         note: Box<LogNote>,
     },
 }
@@ -50,7 +50,7 @@ pub enum LogNote {
 mod tests {
     use super::*;
 
-    /// One of each kind: what a kind says itself is tested beside it.
+    /// One of each kind. All notes of a kind are tested beside it.
     #[test]
     fn a_note_says_what_its_kind_says() {
         let of_table = LogNote::from(TableNote::HeaderAgain { more: 1 });
@@ -70,13 +70,13 @@ mod tests {
             },
         ];
         let said = [
-            "the header stands once more among the rows",
-            "speeds of the Fix rows of satellites alone (GPS)",
-            "left out, not later than the one before: 1 frame",
+            "the header is repeated once among the rows",
+            "speeds of the Fix rows of the GPS provider",
+            "left out, as not later than the frame before: 1 frame",
             "speeds of the camera's GPS, 40 readings on the video's own clock",
-            "no gyroscope with an accelerometer beside it: how the vehicle turned is unknown",
-            "the log's dates have no zone and are taken for UTC, as the video's are",
-            "Location.csv: the header stands once more among the rows",
+            "no gyroscope with an accelerometer: how the vehicle turned is unknown",
+            "the log's dates have no time zone and are taken as UTC, as the video's are",
+            "Location.csv: the header is repeated once among the rows",
         ];
         assert_eq!(notes.map(|note| note.to_string()), said);
     }

@@ -1,6 +1,6 @@
 //! Numbers as apps write them: with a point or a comma, and words for "not measured".
 
-/// What stands in a cell.
+/// The value of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Cell {
     /// Nothing was measured.
@@ -10,7 +10,7 @@ pub(crate) enum Cell {
     Other,
 }
 
-/// Reads a cell. `decimal_comma` says that values are not parted by commas, so that a comma is the decimal point of "12,5".
+/// Reads a cell. `decimal_comma` means that values are not separated by commas, so that the comma in "12,5" is a decimal point.
 pub(crate) fn cell(word: &str, decimal_comma: bool) -> Cell {
     let word = word.trim().trim_matches('"').trim();
     let lower = word.to_ascii_lowercase();
@@ -21,7 +21,7 @@ pub(crate) fn cell(word: &str, decimal_comma: bool) -> Cell {
         return Cell::Absent;
     }
     let text = if decimal_comma && word.contains(',') {
-        // 1.234,5: points part the thousands.
+        // 1.234,5: points separate the thousands.
         word.replace('.', "").replacen(',', ".", 1)
     } else {
         word.to_owned()

@@ -19,7 +19,7 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LineField {
-    /// A part with a name of its format's: an element, a sentence, or `any` for the line as a whole.
+    /// A part named by the format: an element, a sentence, or `any` for the whole line.
     Named(&'static str),
     /// A column of a table, by its header.
     Column(String),
@@ -47,11 +47,11 @@ impl From<&'static str> for LineField {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LineProblem {
-    /// The file is text of 16 bits a letter.
-    #[error("UTF-16 text, save it as UTF-8")]
+    /// The file is UTF-16 text.
+    #[error("UTF-16 text: save it as UTF-8")]
     Utf16,
-    /// The file is no text.
-    #[error("not UTF-8 text, and no binary log that is known")]
+    /// The file is not text.
+    #[error("neither UTF-8 text nor a known binary log")]
     NoText,
     /// A row of a table cannot be read.
     #[error(transparent)]
@@ -77,7 +77,7 @@ pub enum BytesProblem {
     /// GoPro's metadata cannot be read.
     #[error(transparent)]
     Gpmf(#[from] GpmfProblem),
-    /// A binary log of Vector's cannot be read.
+    /// A Vector binary log cannot be read.
     #[error(transparent)]
     Blf(#[from] BlfProblem),
 }
@@ -89,67 +89,67 @@ pub enum SpeedProblem {
     /// Fewer than two rows have a time and a speed.
     #[error("{} with a time and a speed, at least two are needed", count_of(*rows, "row"))]
     TooFewRows {
-        /// How many have.
+        /// Number of rows that have both.
         rows: usize,
     },
     /// Fewer than two fixes lie near each other in time.
     #[error("{} with a time, at least two in ten seconds are needed", count_of(*fixes, "fix"))]
     TooFewFixes {
-        /// How many there are.
+        /// Number of fixes.
         fixes: usize,
     },
     /// A table's column of times is empty.
     #[error("no row below the header has a time")]
     NoTime,
-    /// A table with one value a row does not have what was asked for.
-    #[error("nothing is called '{name}'; measured are: {}", measured.join(", "))]
+    /// A table with one value per row does not have the requested quantity.
+    #[error("no quantity '{name}'; the file has: {}", measured.join(", "))]
     NotMeasured {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// What it has.
+        /// The quantities in the table.
         measured: Vec<String>,
     },
-    /// A table with one value a row has nothing that is called a speed.
-    #[error("nothing measured looks like the vehicle's speed; measured are: {}", measured.join(", "))]
+    /// A table with one value per row has no quantity that is called a speed.
+    #[error("no quantity looks like the vehicle's speed; the file has: {}", measured.join(", "))]
     NoneMeasured {
-        /// What it has.
+        /// The quantities in the table.
         measured: Vec<String>,
     },
     /// GnssLogger's `Fix` rows lack a column.
     #[error("the Fix rows have no column {column}")]
     NoFixColumn {
-        /// The column's name.
+        /// Name of the column.
         column: &'static str,
     },
     /// A folder has no table of positions.
-    #[error("an export folder has one of {}", expected.join(", "))]
+    #[error("no table of positions; expected one of {}", expected.join(", "))]
     NoLocations {
-        /// The names of such tables.
+        /// File names of such tables.
         expected: &'static [&'static str],
     },
     /// A sensor's table lacks an axis.
-    #[error("no column of the axis {axis}")]
+    #[error("no column for the axis {axis}")]
     NoAxis {
         /// The axis: x, y or z.
         axis: &'static str,
     },
-    /// A video has no track of metadata.
-    #[error("a video without a track of GoPro's metadata (gpmd)")]
+    /// A video has no GoPro metadata track.
+    #[error("the video has no GoPro metadata track (gpmd)")]
     NoTrack,
     /// No frame of a CAN trace has the signal.
     #[error("{} {signal}", none_carries(*frames))]
     NoFrame {
-        /// How many frames it has.
+        /// Number of frames in the trace.
         frames: usize,
-        /// The signal's name.
+        /// Name of the signal.
         signal: String,
     },
 }
 
-/// That no frame of a trace carries something.
+/// Beginning of the message that no frame of a trace contains a signal.
 fn none_carries(frames: usize) -> String {
     match frames {
-        1 => "its only frame does not carry".to_owned(),
-        _ => format!("none of its {frames} frames carries"),
+        1 => "its only frame does not contain".to_owned(),
+        _ => format!("none of its {frames} frames contains"),
     }
 }

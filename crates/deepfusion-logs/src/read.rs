@@ -1,4 +1,4 @@
-//! What a file is: by its name, by what stands in it, and by what a user says of it.
+//! The format of a file: from its name, its content, and what the user says about it.
 
 use crate::error::{ColumnProblem, Error, Result};
 use crate::log::{Clock, DriveLog, ReadOptions};
@@ -14,19 +14,19 @@ pub fn is_gps_track(path: &Path) -> bool {
     ["gpx", "nmea"].contains(&extension(path).as_str())
 }
 
-/// Whether a file is a video of a kind that may hold a log of the camera's own, as a GoPro's do; [`read`] tells whether it does.
+/// Whether a file is a video of a kind that may contain a log of the camera's own, like a GoPro's; [`read`] shows whether it does.
 #[must_use]
 pub fn may_hold_log(path: &Path) -> bool {
     ["mp4", "mov", "360", "lrv"].contains(&extension(path).as_str())
 }
 
-/// Reads several logs of one drive: the speeds of the first, with the turns of the first that has some. What the options name is looked for in
-/// the first, and in the others where they have it. `zone_s`: how far the clocks of
-/// logs that name none are ahead of UTC, in seconds, where that is said. `None` for no log at all; else the log with the first one's own clock,
-/// as it was before it was brought to UTC.
+/// Reads several logs of one drive: the speeds of the first, with the turns of the first that has some. The columns named in the options
+/// must be in the first, and are used in the others if they have them. `zone_s`: how far the clocks of logs without a time zone are ahead
+/// of UTC, in seconds, if that is given. `None` for no log at all; else the log with the first one's own clock, as it was before it was
+/// converted to UTC.
 ///
 /// # Errors
-/// As [`read`]; [`crate::Error::OtherClock`] where the turns are on a clock of another kind than the speeds.
+/// As [`read`]; [`crate::Error::OtherClock`] if the turns are on a different kind of clock from the speeds.
 pub fn read_all(
     paths: &[PathBuf],
     options: &ReadOptions,
@@ -50,7 +50,7 @@ pub fn read_all(
         match &mut merged {
             None => merged = Some((log, own)),
             Some((first, _)) if first.yaw_rates.is_empty() && !log.yaw_rates.is_empty() => {
-                // Dates without a zone are taken for UTC, where none is given.
+                // Dates without a zone are taken as UTC, if none is given.
                 let of_dates = |clock| matches!(clock, Clock::Date | Clock::LocalDate);
                 let both_dates = of_dates(first.clock) && of_dates(log.clock);
                 if first.clock != log.clock && !both_dates {
@@ -59,7 +59,7 @@ pub fn read_all(
                 if log.clock == Clock::Free {
                     first.notes.push(ClockNote::SameStart.into());
                 }
-                // Where both lack it, it is said of the speeds.
+                // If both lack a zone, the note for the speeds is enough.
                 if log.clock == Clock::LocalDate && first.clock != log.clock {
                     first.notes.push(of_file(path, ClockNote::LocalDates));
                 }
@@ -72,7 +72,7 @@ pub fn read_all(
     Ok(merged)
 }
 
-/// What is said of one of several logs.
+/// Notes on one of several logs.
 fn of_file(path: &Path, note: ClockNote) -> LogNote {
     let name = path.file_name().unwrap_or_default();
     LogNote::OfFile {
@@ -84,8 +84,8 @@ fn of_file(path: &Path, note: ClockNote) -> LogNote {
 /// Reads a log.
 ///
 /// # Errors
-/// [`crate::Error::File`]; [`crate::Error::Column`] where nothing says which column is meant or what its unit is; [`crate::Error::Line`] and
-/// [`crate::Error::Bytes`] for what cannot be read; [`crate::Error::NoSpeed`] for a file of no known kind, or without a speed;
+/// [`crate::Error::File`]; [`crate::Error::Column`] if it is not known which column is meant or what its unit is; [`crate::Error::Line`]
+/// and [`crate::Error::Bytes`] for content that cannot be read; [`crate::Error::NoSpeed`] for a file of unknown format, or without a speed;
 /// [`crate::Error::Signal`] and [`crate::Error::Motion`] for a CAN trace.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
     if path.is_dir() {

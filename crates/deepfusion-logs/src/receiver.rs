@@ -1,4 +1,4 @@
-//! Sentences as receivers speak them (NMEA 0183).
+//! Sentences of receivers (NMEA 0183).
 
 use crate::error::{BadLine, Result};
 use crate::log::{DriveLog, Format};
@@ -8,7 +8,7 @@ use deepfusion_motion::Fix;
 use nmea::sentences::rmc::{RmcStatusOfFix, parse_rmc};
 use std::path::Path;
 
-/// m/s of a knot.
+/// One knot in m/s.
 const KNOT_MPS: f64 = 1852.0 / 3600.0;
 
 /// Reads a receiver's log.
@@ -18,7 +18,7 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
     log_of_fixes(path, Format::Nmea, &fixes)
 }
 
-/// The fixes of RMC sentences, whose checksums are tested; other sentences, and what is between them, are passed over.
+/// The fixes of RMC sentences, whose checksums are verified. Other sentences, and anything between sentences, are skipped.
 fn sentences(bytes: &[u8]) -> std::result::Result<Vec<TimedFix>, BadLine> {
     let (mut fixes, mut known) = (Vec::new(), false);
     for (index, line) in bytes.split(|b| *b == b'\n').enumerate() {

@@ -1,4 +1,4 @@
-//! What all readers of text share: the text, and what is said of its rows.
+//! What all readers of text share: reading the text, and notes on its rows.
 
 use crate::error::{Error, Result};
 use crate::log::Speed;
@@ -28,7 +28,7 @@ pub(crate) fn text_of(path: &Path) -> Result<String> {
     })
 }
 
-/// Says what of the rows was not used.
+/// Adds notes on the rows that were not used.
 pub(crate) fn left_out(notes: &mut Vec<LogNote>, rows: usize, absent: usize, repeated: usize) {
     if absent > 0 {
         notes.push(TableNote::NoSpeed { absent, rows }.into());
@@ -38,10 +38,10 @@ pub(crate) fn left_out(notes: &mut Vec<LogNote>, rows: usize, absent: usize, rep
     }
 }
 
-/// A log may have one row in so many that is out of the order of time.
+/// At most one row in this many may be out of order in time.
 const ONE_ASTRAY_IN: usize = 100;
 
-/// Rows that are left out, as they are out of the order of time: the clock went back for a moment, or leapt ahead and came back.
+/// Rows left out because they are out of order in time: the clock went back for a moment, or jumped ahead and came back.
 #[derive(Default)]
 pub(crate) struct Astray {
     back: usize,
@@ -50,8 +50,8 @@ pub(crate) struct Astray {
 }
 
 impl Astray {
-    /// Of rows with their times those that are in order, as many as can be. `error` is what is wrong with the first row that is so many
-    /// nanoseconds before the one above.
+    /// Keeps as many rows as can be in order of time. `error` makes the error for the first row that is before the one above; it takes
+    /// the row and the difference in nanoseconds.
     pub(crate) fn leave_out<T>(
         &mut self,
         rows: Vec<(i64, T)>,
@@ -78,10 +78,10 @@ impl Astray {
         kept
     }
 
-    /// What is said of them beside so many rows that are used.
+    /// The notes on them, given the number of rows that are used.
     ///
     /// # Errors
-    /// That of the first, where more than one row in a hundred is astray: such a log is in no order.
+    /// The error of the first such row, if more than one row in a hundred is out of order.
     pub(crate) fn notes(self, used: usize) -> Result<Vec<TableNote>> {
         let (back, ahead) = (self.back, self.ahead);
         let rows = back + ahead + used;
@@ -96,10 +96,10 @@ impl Astray {
     }
 }
 
-/// Which of these times to keep so that they never go back, and as many as can be: the longest non-decreasing subsequence, found by
-/// patience sorting (Fredman 1975). A clock that leaps ahead for a moment so loses that moment, and not what comes after it.
+/// Which of these times to keep so that they never go back, keeping as many as possible: the longest non-decreasing subsequence, found by
+/// patience sorting (Fredman 1975). If a clock jumps ahead for a moment, only that moment is lost, and not what follows it.
 fn in_order(times: &[i64]) -> Vec<bool> {
-    // Of all subsequences of one length, the place of the smallest last time; and of each time's own, the place of the time before it.
+    // For each length of a subsequence, the index of its smallest last time; for each time, the index of the time before it.
     let mut ends: Vec<usize> = Vec::new();
     let mut before: Vec<Option<usize>> = Vec::with_capacity(times.len());
     for (place, time) in times.iter().enumerate() {
@@ -120,7 +120,7 @@ fn in_order(times: &[i64]) -> Vec<bool> {
     kept
 }
 
-/// An error where there are not two speeds.
+/// An error if there are fewer than two speeds.
 pub(crate) fn enough(path: &Path, speeds: &[Speed]) -> Result<()> {
     match speeds.len() {
         rows @ (0 | 1) => Err(Error::NoSpeed {
@@ -137,7 +137,7 @@ mod tests {
     use crate::problem::TableProblem;
     use proptest::prelude::*;
 
-    /// The times that are kept, and what is said.
+    /// The times that are kept, and the notes.
     fn sorted_out(times: &[i64]) -> (Vec<i64>, Result<Vec<TableNote>>) {
         let rows = times.iter().map(|ns| (*ns, ())).collect();
         let mut astray = Astray::default();
@@ -156,7 +156,7 @@ mod tests {
         (kept, notes)
     }
 
-    /// Wherever it leaps, the moment is lost and nothing else.
+    /// Wherever the clock jumps, only that moment is lost.
     #[test]
     fn a_leap_ahead_costs_no_row_after_it() {
         let good: Vec<i64> = (0..400).collect();
@@ -172,7 +172,7 @@ mod tests {
             };
             assert_eq!(notes.unwrap(), [leap], "{at}");
         }
-        // A step back that stays, of a clock that was set: what is before it or after it, whichever is more.
+        // A clock that was set back for good: the larger of the parts before and after is kept.
         let mut times = good.clone();
         times[398..].fill(7);
         let (kept, notes) = sorted_out(&times);

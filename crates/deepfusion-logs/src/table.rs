@@ -1,5 +1,5 @@
-//! Tables of text as apps write them: any delimiter, quotes, a byte order mark, a delimiter too many at each line's end, the header
-//! again where the app was started again.
+//! Tables of text as apps write them: any delimiter, quotes, a byte order mark, an extra delimiter at each line's end, the header
+//! again where the app was restarted.
 
 use crate::columns::Column;
 use crate::error::{BadLine, ColumnProblem, Error, Result};
@@ -13,7 +13,7 @@ pub(crate) struct Table {
     pub(crate) columns: Vec<Column>,
     rows: Vec<Row>,
     decimal_comma: bool,
-    /// Headers that stand among the rows.
+    /// Number of headers among the rows.
     pub(crate) repeated_headers: usize,
 }
 
@@ -23,10 +23,10 @@ struct Row {
 }
 
 impl Table {
-    /// Takes a text apart; `path` is for errors, `first_line` is the number of its first line in the file.
+    /// Splits a text; `path` is for errors, `first_line` is the number of its first line in the file.
     ///
     /// # Errors
-    /// [`Error::Line`] where a row has another number of values than the header.
+    /// [`Error::Line`] if a row has another number of values than the header.
     pub(crate) fn parse(path: &Path, text: &str, first_line: u64) -> Result<Self> {
         let text = text.trim_start_matches('\u{feff}');
         let header = text.lines().next().unwrap_or("");
@@ -57,7 +57,7 @@ impl Table {
         };
         let mut words = csv::StringRecord::new();
         while reader.read_record(&mut words).map_err(refused)? {
-            // A record's place is before the empty lines above it.
+            // A record's position is before the empty lines above it.
             let place = words
                 .position()
                 .map_or((0, 1), |at| (at.byte() as usize, at.line()));
@@ -82,7 +82,7 @@ impl Table {
         Ok(table)
     }
 
-    /// How many rows there are.
+    /// Number of rows.
     pub(crate) fn len(&self) -> usize {
         self.rows.len()
     }
@@ -95,7 +95,7 @@ impl Table {
             .unwrap_or("")
     }
 
-    /// The number in a cell, `None` where nothing was measured.
+    /// The number in a cell; `None` if nothing was measured.
     ///
     /// # Errors
     /// [`Error::Line`] for anything else.
@@ -111,7 +111,7 @@ impl Table {
         }
     }
 
-    /// A cell's text with a decimal comma made a point.
+    /// A cell's text with a decimal point instead of a decimal comma.
     pub(crate) fn plain_word(&self, row: usize, column: &Column) -> String {
         let word = self.word(row, column).trim_matches('"').trim();
         let is_number = |b: u8| b.is_ascii_digit() || b"+-.,".contains(&b);
@@ -142,13 +142,13 @@ impl Table {
         self.rows.get(row).map_or(0, |r| r.line)
     }
 
-    /// The first column with one of these names, in the names' order.
+    /// The first column with one of these names, tried in this order.
     pub(crate) fn named(&self, names: &[&str]) -> Option<&Column> {
         let find = |name: &&str| self.columns.iter().find(|c| c.name == **name);
         names.iter().find_map(find)
     }
 
-    /// A column as a user names it: the whole header, or the name without its unit.
+    /// A column by the name that a user gives: the whole header, or the name without its unit.
     ///
     /// # Errors
     /// [`ColumnProblem::Missing`].
@@ -163,7 +163,7 @@ impl Table {
     }
 }
 
-/// A word that fits on a line.
+/// The text, shortened to fit on a line.
 pub(crate) fn short(word: &str) -> String {
     word.chars().take(40).collect()
 }

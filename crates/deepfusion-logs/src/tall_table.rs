@@ -1,4 +1,4 @@
-//! Tables with one value a row: time, what was measured, its value, its unit. Car Scanner writes these.
+//! Tables with one value per row: time, quantity, value, unit. Car Scanner writes these.
 
 use crate::columns::{Column, speed_rank};
 use crate::error::{ColumnProblem, Error, Result};
@@ -15,12 +15,12 @@ const QUANTITIES: [&str; 4] = ["pid", "sensor", "parameter", "signal"];
 const VALUES: [&str; 1] = ["value"];
 const UNITS: [&str; 2] = ["units", "unit"];
 
-/// Whether a table is a tall one.
+/// Whether a table has this form.
 pub(crate) fn is_one(table: &Table) -> bool {
     table.named(&QUANTITIES).is_some() && table.named(&VALUES).is_some()
 }
 
-/// The rows of the vehicle's speed.
+/// Reads the rows of the vehicle's speed.
 pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
     let times = Times::of(table, options)?;
     let (Some(quantity), Some(value)) = (table.named(&QUANTITIES), table.named(&VALUES)) else {
@@ -102,7 +102,7 @@ fn chosen(
             })),
         };
     }
-    // A speed in another language is known by its unit alone, if it is the only one.
+    // In another language the speed is recognised by its unit alone, if only one quantity has such a unit.
     let ranked = found.iter().filter_map(|(name, unit)| {
         let rank = speed_rank(&name.to_lowercase())?;
         Some(((unit.is_none(), rank, *name), *unit))

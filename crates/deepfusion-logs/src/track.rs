@@ -7,16 +7,16 @@ use crate::problem::SpeedProblem;
 use deepfusion_motion::{Fix, FixSpeedSource, course_rates, speeds_of_fixes};
 use std::path::Path;
 
-/// A fix and its time in nanoseconds; the fix's own time is not set.
+/// A fix with its time in nanoseconds; the fix's own time is not set.
 pub(crate) struct TimedFix {
     pub(crate) ns: i64,
     pub(crate) fix: Fix,
 }
 
-/// The speeds of fixes with dates: as the receiver measured them where most fixes have one, else from the smoothed positions.
+/// The speeds of fixes with dates: as the receiver measured them if most fixes have one, else from the smoothed positions.
 ///
 /// # Errors
-/// [`Error::NoSpeed`] where fewer than two fixes have a neighbour.
+/// [`Error::NoSpeed`] if fewer than two fixes have a neighbour.
 pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> Result<DriveLog> {
     let origin = timed.first().map_or(0, |t| t.ns);
     let fixes = timed.iter().map(|t| Fix {

@@ -1,6 +1,6 @@
-//! A phone's yaw rate. Nobody knows how it is mounted, but gravity says which way is up: the yaw rate is the gyroscope's rate about
-//! that axis. Platforms disagree on the sign of gravity (at rest some report the pull, some the support), so the sign is that which
-//! agrees with how the satellites saw the course change.
+//! A phone's yaw rate. Its mounting is unknown, but gravity shows which way is up: the yaw rate is the gyroscope's rate about
+//! that axis. Platforms disagree on the sign of gravity (at rest some report the pull, some the support), so the sign is chosen to
+//! agree with the changes of the GPS course.
 
 use crate::log::YawRate;
 use crate::note::{TurnSign, TurnsNote};
@@ -22,16 +22,16 @@ pub(crate) struct Heading {
     pub(crate) clockwise_rad: f64,
 }
 
-/// Least agreement (correlation) of turns and course that decides the sign.
+/// Least agreement (correlation) of turns and course for which the sign is decided.
 const DECIDED: f64 = 0.5;
-/// Least number of course changes that it is taken from.
+/// Least number of course changes used for it.
 const CHANGES: usize = 10;
-/// Courses farther apart are not compared, in nanoseconds.
+/// Courses further apart are not compared, in nanoseconds.
 const APART_NS: i64 = 3_000_000_000;
 
-/// The rates about the axis that points up, positive to the left, and how they were understood.
+/// The rates about the axis that points up, positive to the left, and how they were interpreted.
 ///
-/// `rates` are in rad/s, `accelerations` hold gravity, on average over the drive much more of it than of anything else.
+/// `rates` are in rad/s. `accelerations` include gravity, which is by far their largest part on average over the drive.
 pub(crate) fn yaw_rates(
     rates: &[Sensor],
     accelerations: &[Sensor],
@@ -39,7 +39,7 @@ pub(crate) fn yaw_rates(
 ) -> (Vec<YawRate>, TurnsNote) {
     let mean = accelerations.iter().map(|a| a.value).sum::<Vector3<f64>>()
         / accelerations.len().max(1) as f64;
-    // Without gravity in it, what is left of a drive's accelerations is a tenth of this.
+    // Without gravity, what is left of a drive's accelerations is a tenth of this.
     let Some(up) = mean.try_normalize(4.0) else {
         return (Vec::new(), TurnsNote::NoGravity);
     };
@@ -59,7 +59,7 @@ pub(crate) fn yaw_rates(
     (turns.collect(), TurnsNote::AboutGravity(by))
 }
 
-/// Correlation of the turns to the left that the gyroscope and the course saw between neighbouring courses, and of how many.
+/// Correlation of the turns to the left according to the gyroscope and to the course, between neighbouring courses; and their number.
 fn agreement(about_up: &[(i64, f64)], course: &[Heading]) -> (f64, usize) {
     let mut angle = 0.0;
     let mut angles = Vec::with_capacity(about_up.len());
@@ -96,7 +96,7 @@ fn agreement(about_up: &[(i64, f64)], course: &[Heading]) -> (f64, usize) {
 mod tests {
     use super::*;
 
-    /// A drive in bends, with a phone that hangs askew: its rates, what it feels of gravity, the course.
+    /// A drive through bends, with a phone mounted askew: its rates, its accelerations with gravity, the course.
     fn drive(felt: f64) -> (Vec<Sensor>, Vec<Sensor>, Vec<Heading>, Vec<f64>) {
         let up = Vector3::new(0.2, 0.9, 0.3).normalize();
         let rate = |t: f64| 0.3 * (0.4 * t).sin();

@@ -9,14 +9,14 @@ pub enum SpeedUnit {
     MetresPerSecond,
     /// km/h.
     KilometresPerHour,
-    /// Miles an hour.
+    /// Miles per hour.
     MilesPerHour,
-    /// Nautical miles an hour.
+    /// Nautical miles per hour.
     Knots,
 }
 
 impl SpeedUnit {
-    /// All of them.
+    /// All units.
     pub const ALL: [Self; 4] = [
         Self::MetresPerSecond,
         Self::KilometresPerHour,
@@ -24,7 +24,7 @@ impl SpeedUnit {
         Self::Knots,
     ];
 
-    /// m/s of one.
+    /// One unit in m/s.
     #[must_use]
     pub fn mps(self) -> f64 {
         match self {
@@ -63,7 +63,7 @@ impl FromStr for SpeedUnit {
     }
 }
 
-/// A word that names no unit of speed.
+/// The text does not name a unit of speed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("'{0}' is not a unit of speed: m/s, km/h, mph or knots")]
 #[non_exhaustive]

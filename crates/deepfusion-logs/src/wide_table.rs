@@ -1,4 +1,4 @@
-//! A table with a column for each quantity.
+//! A table with a column per quantity.
 
 use crate::columns::{Column, TIMES};
 use crate::dates::{TimeStyle, clock_of, nanoseconds, style_of};
@@ -42,7 +42,7 @@ impl<'a> Times<'a> {
                 problem: SpeedProblem::NoTime,
             });
         };
-        // A number's column may be named for its unit: "seconds", "UnixTimeMillis".
+        // A column of numbers may be named after its unit: "seconds", "UnixTimeMillis".
         let unit = column.unit.as_deref().or(match column.name.as_str() {
             "seconds" | "seconds elapsed" => Some("s"),
             "unixtimemillis" => Some("ms"),
@@ -62,7 +62,7 @@ impl<'a> Times<'a> {
         })
     }
 
-    /// The times of these rows of the table, each with what was read of it; those that are out of order go `astray`.
+    /// The times of these rows, each with the value read from the row; rows that are out of order go to `astray`.
     pub(crate) fn in_order<T>(
         &self,
         table: &Table,
@@ -91,7 +91,7 @@ impl<'a> Times<'a> {
     }
 }
 
-/// A table with a column for each quantity.
+/// Reads a table with a column per quantity.
 pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
     let times = Times::of(table, options)?;
     let speed = match &options.speed {
@@ -175,10 +175,10 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
 /// Names of a speed's standard deviation.
 const ACCURACY: [&str; 2] = ["speedaccuracy", "speed accuracy"];
 
-/// Names of a vehicle's yaw rate. A gyroscope's own axes are none: nobody knows how it is mounted.
+/// Names of a vehicle's yaw rate. A gyroscope's own axes are not among them: its mounting is unknown.
 const YAW_RATE: [&str; 3] = ["yaw rate", "yawrate", "yaw velocity"];
 
-/// rad/s of one of a unit of turning, by the spellings that recorders use.
+/// One unit of rotation in rad/s, in the spellings that recorders use.
 fn radps_of(unit: &str) -> Option<f64> {
     match unit {
         "rad/s" | "radps" | "rad/sec" => Some(1.0),
@@ -187,7 +187,7 @@ fn radps_of(unit: &str) -> Option<f64> {
     }
 }
 
-/// The yaw rates of the rows that have one. Where nothing says their unit, none and a note.
+/// The yaw rates of the rows that have one. Without a known unit, none and a note.
 fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<LogNote>) -> Result<Vec<YawRate>> {
     let Some(column) = table.named(&YAW_RATE) else {
         return Ok(Vec::new());
@@ -209,7 +209,7 @@ fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<LogNote>) -> Result<V
     }
     let mut astray = Astray::default();
     let rows = times.in_order(table, rows, &mut astray)?;
-    // Of rows that have a speed, too, it is said already.
+    // For rows that also have a speed, this has been noted already.
     for note in astray.notes(rows.len())?.into_iter().map(LogNote::from) {
         if !notes.contains(&note) {
             notes.push(note);
@@ -220,7 +220,7 @@ fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<LogNote>) -> Result<V
         radps: value * radps,
     });
     let mut found: Vec<YawRate> = turns.collect();
-    // Of rows of one moment the first.
+    // The first of several rows with the same time.
     found.dedup_by_key(|turn| turn.ns);
     if !found.is_empty() {
         notes.push(TableNote::YawRate { column: header() }.into());
@@ -232,13 +232,13 @@ fn times_absent(table: &Table, times: &Times, row: usize) -> bool {
     ["", "-"].contains(&table.word(row, times.column))
 }
 
-/// The column that fits a vehicle's speed best; of equal ones that whose unit is known, then the first.
+/// The column that fits a vehicle's speed best; of equally good ones the first with a known unit, else the first.
 fn best_speed(table: &Table, unit: Option<SpeedUnit>) -> Option<&Column> {
     let ranked = table
         .columns
         .iter()
         .filter_map(|c| Some((c.speed_rank()?, c)));
-    // A column in which nothing stands is none: OBD apps list what the vehicle never answered.
+    // An empty column is ignored: OBD apps list quantities that the vehicle never sent.
     let filled =
         |c: &Column| (0..table.len()).any(|row| matches!(table.number(row, c), Ok(Some(_))));
     let with_unit = |c: &Column| c.speed_unit().or(unit).is_some();
@@ -274,7 +274,7 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<LogNote>) -> Result<Dr
         if times_absent(table, times, row) || (latitude_deg == 0.0 && longitude_deg == 0.0) {
             continue;
         }
-        // 91, 181 or 999 where there is no fix; all of them are such where the unit is another one.
+        // 91, 181 or 999 without a fix; all values are such if the unit is a different one.
         if latitude_deg.abs() > 90.0 || longitude_deg.abs() > 360.0 {
             beyond.push((row, latitude_deg, longitude_deg));
             continue;

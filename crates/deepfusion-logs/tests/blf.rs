@@ -1,9 +1,9 @@
-//! Vector's binary log as python-can writes it (`reference/make_blf.py`), against the same frames as text; and damaged files.
+//! Vector's binary log as python-can writes it (`reference/make_blf.py`), compared with the same frames as text; and damaged files.
 
 use deepfusion_logs::{Clock, DriveLog, Error, Format, ReadOptions, Result, read};
 use std::path::{Path, PathBuf};
 
-/// zlib, none, CAN FD, and steps of 10 µs.
+/// Compressed with zlib, uncompressed, CAN FD, and in steps of 10 µs.
 const FILES: [&str; 4] = ["vector.blf", "plain.blf", "fd.blf", "ten_microseconds.blf"];
 
 fn fixture(name: &str) -> PathBuf {
@@ -21,7 +21,7 @@ fn speeds_of(path: &Path) -> Result<DriveLog> {
     read(path, &options)
 }
 
-/// What is read from changed bytes.
+/// What is read from modified bytes.
 fn changed(bytes: &[u8]) -> Result<DriveLog> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("changed.blf");
@@ -39,7 +39,7 @@ fn a_binary_log_has_the_speeds_of_the_same_frames_as_text() {
         assert_eq!(log.clock, Clock::LocalDate);
         assert_eq!(log.notes[0], text.notes[0], "{name}");
         assert_eq!(log.speeds.len(), text.speeds.len());
-        // python-can keeps times as doubles, good to a quarter of a microsecond; the last file rounds to ten.
+        // python-can keeps times as doubles, accurate to a quarter of a microsecond; the last file rounds to ten.
         let step_ns = if name == "ten_microseconds.blf" {
             10_000
         } else {
@@ -79,12 +79,12 @@ fn a_file_that_was_cut_off_says_where() {
             }
             cut[16..24].copy_from_slice(&144_u64.to_le_bytes());
             match changed(&cut) {
-                // Between two containers, or within the zeros behind one.
+                // Cut between two containers, or within the zeros after one.
                 Ok(log) => assert!(log.speeds.len() < 121),
                 Err(Error::Bytes { offset, .. }) => {
                     assert!((144..=length as u64).contains(&offset), "{name}, {length}");
                 }
-                // Nothing, or one frame.
+                // No frame, or one.
                 Err(other) => assert!(matches!(other, Error::NoSpeed { .. }), "{other}"),
             }
         }
@@ -100,23 +100,35 @@ fn a_damaged_file_is_an_error_with_its_byte_and_never_a_panic() {
         changed
     };
     for (at, new, expected) in [
-        (0, &b"LOGX"[..], "byte 0: LOGG: no binary log"),
-        (4, &[3, 0, 0, 0], "byte 4: LOGG: a header of 3 bytes"),
+        (0, &b"LOGX"[..], "byte 0: LOGG: not a Vector binary log"),
+        (
+            4,
+            &[3, 0, 0, 0],
+            "byte 4: LOGG: invalid header size: 3 bytes",
+        ),
         (42, &[13, 0], "byte 40: measurement start"),
         (144, b"LOBX", "byte 144: LOBJ: no object begins here"),
-        (152, &[1, 0, 0, 0], "byte 144: LOBJ: an object of 1 byte"),
-        (160, &[7, 0], "byte 144: LOG_CONTAINER: compression 7"),
+        (
+            152,
+            &[1, 0, 0, 0],
+            "byte 144: LOBJ: invalid object size: 1 byte",
+        ),
+        (
+            160,
+            &[7, 0],
+            "byte 144: LOG_CONTAINER: unknown compression 7",
+        ),
         (
             168,
             &[1, 0, 0, 0],
-            "byte 144: LOG_CONTAINER: it holds 2 bytes and says 1",
+            "byte 144: LOG_CONTAINER: its content has 2 bytes, its header says 1",
         ),
         (180, &[0xff; 8], "byte 144: LOG_CONTAINER: zlib"),
     ] {
         let error = changed(&with(at, new)).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}, not {expected}");
     }
-    // Every byte of the uncompressed form, whose objects are read as they stand.
+    // Every byte of the uncompressed form, whose objects are read directly.
     let plain = std::fs::read(fixture("plain.blf")).unwrap();
     for at in (0..plain.len()).step_by(7) {
         for flip in [0x01, 0x80, 0xff] {

@@ -1,4 +1,4 @@
-//! One log of each kind, of one drive whose speeds and turns are known (`reference/make_logs.py`), read back; and damaged ones.
+//! One log of each format, of a drive whose speeds and turns are known (`reference/make_logs.py`), read back; and damaged ones.
 
 use deepfusion_logs::{
     Clock, ClockNote, DriveLog, Format, GoproLens, LogNote, ReadOptions, SpeedUnit, TableNote,
@@ -27,7 +27,7 @@ fn true_yaw_rate(t: f64) -> f64 {
     0.3 * (0.5 * t).sin()
 }
 
-/// Seconds of the drive, whose first moment is `origin_ns` on the log's clock.
+/// The time within the drive, in seconds, if the drive begins at `origin_ns` on the log's clock.
 fn seconds(ns: i64, origin_ns: i64) -> f64 {
     (ns - origin_ns) as f64 * 1e-9
 }
@@ -52,7 +52,7 @@ fn a_track_without_speeds_is_smoothed() {
     let log = plain("phone.gpx");
     assert_eq!((log.format, log.clock), (Format::Gpx, Clock::Date));
     assert_eq!(log.speeds.len(), 13);
-    // One position a second of a speed that swings by 3 m/s in 16 s: the ends have neighbours on one side only.
+    // One position a second, of a speed that varies by 3 m/s in 16 s: the ends have neighbours on one side only.
     for (i, speed) in log.speeds.iter().enumerate() {
         let error = (speed.mps - true_speed(seconds(speed.ns, NOON_NS))).abs();
         let sigma = speed.sigma_mps.unwrap();
@@ -61,7 +61,7 @@ fn a_track_without_speeds_is_smoothed() {
     }
 }
 
-/// A clock that steps back for a row: the row is left out and counted; a table in no order is refused by the first such row.
+/// A clock that steps back for a row: the row is left out and counted; a table out of order is refused at the first such row.
 #[test]
 fn a_row_that_goes_back_is_left_out() {
     let folder = tempfile::tempdir().unwrap();
@@ -86,7 +86,7 @@ fn a_row_that_goes_back_is_left_out() {
     assert!(error.contains("0.4 s before the row above"), "{error}");
 }
 
-/// A clock that leaps ahead for a row, among the last of the table: the row is left out, not those after it.
+/// A clock that jumps ahead for a row, among the last of the table: this row is left out, not those after it.
 #[test]
 fn a_row_that_leaps_ahead_costs_itself_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -153,7 +153,7 @@ fn a_tables_yaw_rate_is_read_where_its_unit_is_said() {
 fn torque_has_the_vehicles_speed_and_a_receivers() {
     let log = plain("torque.csv");
     assert_eq!((log.format, log.clock), (Format::Table, Clock::LocalDate));
-    // Five of the 25 rows have no answer of the vehicle; the receiver's speed, a metre a second more, is not taken.
+    // In five of the 25 rows the vehicle did not answer; the receiver's speed, a metre a second higher, is not used.
     speeds_are_true(&log, NOON_NS, 20, 1e-3);
     for note in [
         TableNote::Column {
@@ -207,7 +207,7 @@ fn sensor_logger_has_turns_too() {
         "gravity points down there: {:?}",
         log.notes
     );
-    // By another of its columns of time both are on that one's clock.
+    // With another of its columns of time, both are on that column's clock.
     let elapsed = ReadOptions {
         time: Some("seconds_elapsed".into()),
         ..ReadOptions::default()
@@ -253,7 +253,7 @@ fn a_table_of_anybodys_needs_to_be_told_its_columns() {
     options.speed = Some("Fahrt".into());
     let error = read(&path, &options).unwrap_err().to_string();
     assert!(
-        error.contains("nothing says the unit of the speed in column 'Fahrt'"),
+        error.contains("the unit of the speed in column 'Fahrt' is not known"),
         "{error}"
     );
     options.unit = Some(SpeedUnit::Knots);
@@ -265,7 +265,7 @@ fn a_table_of_anybodys_needs_to_be_told_its_columns() {
     assert!(error.contains("no column 'Tempo'"), "{error}");
 }
 
-/// Speeds in UTC, and turns by a clock on the wall.
+/// Speeds in UTC, and turns on a local clock.
 #[test]
 fn turns_of_another_zone_are_not_taken_for_utc_without_a_word() {
     let folder = tempfile::tempdir().unwrap();
@@ -313,7 +313,10 @@ fn can_traces_of_both_kinds_are_the_same() {
     let error = read(&fixture("candump.log"), &ReadOptions::default())
         .unwrap_err()
         .to_string();
-    assert!(error.contains("a DBC file does"), "{error}");
+    assert!(
+        error.contains("a DBC file that describes its frames is needed"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -325,7 +328,7 @@ fn a_track_shows_how_its_course_turned() {
         let t = seconds(turn.ns, NOON_NS);
         (turn.radps - true_yaw_rate(t)).powi(2)
     });
-    // Positions a second apart, smoothed as if sure to a metre: the turns themselves have 0.2 rad/s.
+    // Positions a second apart, smoothed as if accurate to a metre: the turns themselves have 0.2 rad/s.
     let rms = (off.sum::<f64>() / 12.0).sqrt();
     assert!(rms < 0.08, "{rms}");
 }
@@ -354,12 +357,12 @@ fn a_gopros_video_says_through_which_lens_it_was_filmed() {
     // tan 47° = 1.0724; half a diagonal is √(960² + 540²) = 1101.5.
     let focal = lens.focal_px((1920, 1080)).unwrap();
     assert!((focal - 1101.454 / 1.072_369).abs() < 0.01, "{focal}");
-    // A smaller copy, one stored upright, one with sides of whole blocks.
+    // A smaller copy, one stored upright, one cropped to whole blocks.
     let halved = lens.focal_px((960, 540)).unwrap();
     assert!((halved - focal / 2.0).abs() < 1e-9);
     assert_eq!(lens.focal_px((1080, 1920)), Some(focal));
     assert!(lens.focal_px((1920, 1088)).is_some());
-    // Cut to another shape, zoomed into, or through a lens that bends lines.
+    // Cropped to another shape, zoomed, or through a lens that bends lines.
     assert_eq!(lens.focal_px((1440, 1080)), None);
     let mut bytes = std::fs::read(fixture("gopro.mp4")).unwrap();
     let step = bytes.windows(4).position(|w| w == b"DZST").unwrap() + 8;
@@ -379,7 +382,7 @@ fn a_gopros_video_says_through_which_lens_it_was_filmed() {
         ..lens
     };
     assert_eq!(no_angle.focal_px((1920, 1080)), None);
-    // Any other file says nothing of it.
+    // Any other file has no lens settings.
     assert_eq!(GoproLens::read(&fixture("phone.gpx")).ok().flatten(), None);
 }
 
@@ -443,7 +446,7 @@ fn damaged_logs_are_named_by_line_and_column() {
             "car_scanner.csv",
             "Vehicle speed",
             "Wheel turns",
-            "nothing measured looks like the vehicle's speed; measured are: Average speed, Engine RPM, Wheel turns",
+            "no quantity looks like the vehicle's speed; the file has: Average speed, Engine RPM, Wheel turns",
         ),
     ] {
         if name == "torque.csv" && from == "Speed (OBD)(km/h)" {
@@ -476,14 +479,14 @@ fn a_video_that_was_cut_off_says_where() {
             .to_string();
         assert!(error.contains("cut.mp4"), "{length}: {error}");
     }
-    // Bytes damaged anywhere are an error or another number, never a panic.
+    // Damage anywhere gives an error or another number, never a panic.
     for at in (0..bytes.len()).step_by(13) {
         let mut damaged = bytes.clone();
         damaged[at] ^= 0xa5;
         std::fs::write(&path, &damaged).unwrap();
         let _ = read(&path, &ReadOptions::default());
     }
-    // What is said of the lens stands at the end.
+    // The lens settings are at the end.
     for at in bytes.len() - 300..bytes.len() {
         let mut damaged = bytes.clone();
         damaged[at] ^= 0xa5;

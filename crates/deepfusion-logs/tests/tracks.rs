@@ -17,7 +17,7 @@ fn refusal(name: &str, text: &str) -> String {
     error.to_string()
 }
 
-/// Points a second apart and `step` degrees of latitude, as an app writes them.
+/// Points a second apart and `step` degrees of latitude apart, as an app writes them.
 fn track(points: usize, step: f64, speed: impl Fn(usize) -> String) -> String {
     let point = |i: usize| {
         format!(
@@ -61,7 +61,7 @@ fn a_speed_in_an_extension_counts() {
     assert_eq!(speeds, [0.5, 1.5, 2.5, 3.5, 4.5]);
 }
 
-/// iOS writes -1 where it does not know the speed, OsmAnd none where it is 0.
+/// iOS writes -1 for an unknown speed; OsmAnd writes none if it is 0.
 #[test]
 fn a_point_without_a_speed_leaves_the_others_theirs() {
     for unknown in ["<speed>-1</speed>", ""] {
@@ -84,11 +84,11 @@ fn what_is_wrong_with_a_track_is_named_by_line() {
     for (bad, expected) in [
         (
             good.replacen("lon=\"8.4\"", "lon=\"east\"", 1),
-            "a.gpx:3: lon: 'east' is no angle",
+            "a.gpx:3: lon: 'east' is not an angle",
         ),
         (
             good.replacen("lat=", "latitude=", 1),
-            "a.gpx:3: lat: the point has none",
+            "a.gpx:3: lat: missing in this point",
         ),
         (
             good.replace("12:00:01.250Z", "noon"),
@@ -96,10 +96,10 @@ fn what_is_wrong_with_a_track_is_named_by_line() {
         ),
         (
             good.replacen("</ele>", "</ele><speed>fast</speed>", 2),
-            "a.gpx:3: speed: 'fast' is no speed",
+            "a.gpx:3: speed: 'fast' is not a speed",
         ),
         (good[..good.len() - 100].to_owned(), "a.gpx:"),
-        ("<html></html>".to_owned(), "it is no GPX file"),
+        ("<html></html>".to_owned(), "not a GPX file"),
         (good.replacen("<ele>", "</ele>", 1), "a.gpx:3: XML: "),
         (track(1, 0.0, |_| String::new()), "1 fix with a time"),
         (good.replace("time>", "clock>"), "0 fixes with a time"),
@@ -140,11 +140,11 @@ fn sentences_give_the_receivers_speed() {
     assert_eq!(
         speeds,
         [5.14, 10.29, 10.29],
-        "knots; a fix that is void does not count"
+        "knots; a void fix does not count"
     );
     assert_eq!(log.speeds[0].ns, 1_777_636_800_500_000_000);
     let damaged = text.replace("20.0,90.0", "29.0,90.0");
     let error = refusal("a.nmea", &damaged);
     assert!(error.contains("a.nmea:5: RMC: the checksum is"), "{error}");
-    assert!(refusal("a.nmea", "hello\n").contains("no sentence in it"));
+    assert!(refusal("a.nmea", "hello\n").contains("no NMEA sentence"));
 }

@@ -2,18 +2,18 @@
 
 use crate::DepthMaps;
 
-/// Largest deviation of a file from the network it was made from.
+/// Largest allowed deviation of a file from the network it was made from.
 ///
 /// Sums of some thousand f32 products in another order differ by about 1e-6 of the largest output; a wrong
-/// border, a wrong order of channels or a missed layer by far more than this.
+/// border, a wrong order of channels or a missing layer by far more than this.
 pub const TOLERANCE: f64 = 1e-4;
 
 /// Deviation of one engine's maps from another's: max |a − b| / max |b| over a set of pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
-    /// Of depth in metres.
+    /// Deviation of the depth in metres.
     pub depth: f64,
-    /// Of disparity in 1/m.
+    /// Deviation of the disparity in 1/m.
     pub disparity: f64,
 }
 
@@ -44,7 +44,7 @@ pub fn deviation(found: &[DepthMaps], expected: &[DepthMaps]) -> Deviation {
     }
 }
 
-/// max |a − b| / max |b|; infinite where a value is not finite or the lengths differ.
+/// max |a − b| / max |b|; infinite if a value is not finite or the lengths differ.
 #[must_use]
 pub fn relative(a: &[f32], b: &[f32]) -> f64 {
     let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
@@ -66,7 +66,7 @@ pub fn relative(a: &[f32], b: &[f32]) -> f64 {
 /// Names of the [`pictures`].
 pub const PICTURES: [&str; 4] = ["noise", "ramps", "checkerboard", "street"];
 
-/// Pictures that reveal a wrong network: noise in every pixel, ramps of another direction in each colour
+/// Pictures that reveal a wrong network: noise in every pixel, ramps in a different direction for each colour
 /// (channels and axes), a checkerboard (strides and offsets), a street of flat areas with edges.
 ///
 /// # Shapes

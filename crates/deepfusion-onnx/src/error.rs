@@ -7,69 +7,69 @@ use crate::{LibraryProblem, ModelProblem, NodeProblem};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Bytes that are no ONNX file.
+    /// The bytes are not an ONNX file.
     #[error("not an ONNX file: {0}")]
     Decode(#[from] prost::DecodeError),
-    /// An operation that cannot be written, or that is not one this program writes.
+    /// An operation cannot be written, or is not one that this program writes.
     #[error("ONNX node `{name}` ({op}): {reason}")]
     Node {
-        /// The node's name.
+        /// Name of the node.
         name: String,
-        /// Its operator.
+        /// Operator of the node.
         op: String,
-        /// What is wrong with it.
+        /// What is wrong with the node.
         reason: NodeProblem,
     },
-    /// A part of the model other than a node.
+    /// A part of the model other than a node is wrong.
     #[error("ONNX model, {part}: {reason}")]
     Model {
-        /// Which part.
+        /// Name of the part.
         part: &'static str,
-        /// What is wrong with it.
+        /// What is wrong with the part.
         reason: ModelProblem,
     },
-    /// A network that does not fit together, or an image size that it cannot work on.
+    /// The network is inconsistent, or cannot run on this image size.
     #[error(transparent)]
     Network(#[from] deepfusion_infer::Error),
-    /// A file too large for the format.
-    #[error("the model has {bytes} bytes; an ONNX file can hold {most}")]
+    /// The file is too large for the format.
+    #[error("the model has {bytes} bytes; an ONNX file holds at most {most}")]
     TooLarge {
-        /// Size of the file that would be needed.
+        /// Size of the file that would be needed, bytes.
         bytes: usize,
-        /// The most that fits.
+        /// Largest possible size, bytes.
         most: usize,
     },
-    /// No ONNX Runtime on this machine.
-    #[error("no ONNX Runtime library found: looked at {}", list(searched))]
+    /// There is no ONNX Runtime on this machine.
+    #[error("no ONNX Runtime library found in {}", list(searched))]
     NoLibrary {
-        /// Where it was looked for.
+        /// The folders that were searched.
         searched: Vec<PathBuf>,
     },
-    /// A file that is no ONNX Runtime library, or not one that can be used.
-    #[error("{}: no ONNX Runtime that can be used: {reason}", path.display())]
+    /// The file is not an ONNX Runtime library, or not a usable one.
+    #[error("{}: not a usable ONNX Runtime library: {reason}", path.display())]
     Library {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Why it is not usable.
         #[source]
         reason: LibraryProblem,
     },
-    /// What ONNX Runtime itself refuses.
+    /// ONNX Runtime itself returned an error.
     #[error("ONNX Runtime cannot {action}: {source}")]
     Runtime {
-        /// What was tried.
+        /// The attempted action.
         action: &'static str,
-        /// What it says.
+        /// Its message.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// An image or a buffer of another size than the model's.
+    /// An image or a buffer has another size than the model needs.
     #[error("{what} of {}, expected {expected}", count_of(*found, "value"))]
     Length {
-        /// Which one.
+        /// Name of the image or buffer.
         what: &'static str,
-        /// Values expected.
+        /// Expected number of values.
         expected: usize,
-        /// Values given.
+        /// Given number of values.
         found: usize,
     },
 }
@@ -77,11 +77,13 @@ pub enum Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let hint = match self {
-            Self::Decode(_) => "is it complete? A partial copy ends early",
-            Self::Node { .. } | Self::Model { .. } => "only files that this version wrote are read",
+            Self::Decode(_) => "check that the file is complete: a partial copy ends early",
+            Self::Node { .. } | Self::Model { .. } => {
+                "export the network again: only files written by this version are read"
+            }
             Self::TooLarge { .. } => "choose a network with fewer weights",
             Self::NoLibrary { .. } => {
-                "`pip install onnxruntime` is enough, or set ORT_DYLIB_PATH to libonnxruntime.so of 1.17 or later"
+                "run `pip install onnxruntime`, or set ORT_DYLIB_PATH to libonnxruntime.so of version 1.17 or later"
             }
             Self::Library { .. } => {
                 "give libonnxruntime.so (onnxruntime.dll, libonnxruntime.dylib) of ONNX Runtime 1.17 or later, built for this processor"

@@ -26,11 +26,11 @@ pub struct DepthModel {
     pub width: usize,
     /// Height of the images, in pixels.
     pub height: usize,
-    /// The camera trained with. Depth of another camera's images is to be multiplied by
+    /// Focal lengths of the training camera. Depth of another camera's images has to be multiplied by
     /// f_y(that camera at this model's size) / f_y(trained with).
     pub trained_with: Option<FocalLength>,
-    /// Whether [`Self::trained_with`] is a canonical focal length, which no camera need have had: then depth of every camera's images is to be
-    /// multiplied so.
+    /// Whether [`Self::trained_with`] is a canonical focal length, which no real camera may have: then the depth of every camera's images
+    /// has to be multiplied in this way.
     pub canonical: bool,
 }
 
@@ -47,7 +47,7 @@ impl DepthModel {
     /// Checks that the model can run on its images and has a single output, the depth map.
     ///
     /// # Errors
-    /// [`Error::Network`] for a size that the network cannot halve, or that is smaller than its reflected
+    /// [`Error::Network`] for a size that the network cannot halve, or that is too small for its reflected
     /// borders; [`Error::Model`] for an invalid range or other outputs.
     pub fn validate(&self) -> Result<(), Error> {
         self.graph.check_size(self.width, self.height)?;

@@ -1,4 +1,4 @@
-//! What is wrong with a file, with a part of it, or with what should run it.
+//! What is wrong with a file, with a part of it, or with the library that should run it.
 
 use std::path::PathBuf;
 
@@ -9,59 +9,59 @@ use deepfusion_infer::ValueShape;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NodeProblem {
-    /// Read and written again, it is another.
-    #[error("not as this program writes it")]
+    /// The node, read and written again, differs.
+    #[error("differs from what this program writes")]
     Differs,
-    /// An operator where none such can be.
-    #[error("not an operation that is expected here")]
+    /// The operator cannot be at this position.
+    #[error("this operation is not expected here")]
     NotExpected,
-    /// Another operator than the one that follows here.
+    /// The operator is not the one that has to follow here.
     #[error("expected {op} here")]
     Expected {
-        /// The operator.
+        /// The expected operator.
         op: &'static str,
     },
-    /// A border without the convolution that it is for.
+    /// A border has no convolution.
     #[error("no Conv after it")]
     NoConv,
-    /// Something else than a kernel's weights.
-    #[error("weights that have not four dimensions")]
+    /// The values are not a kernel's weights.
+    #[error("the weights do not have four dimensions")]
     WeightDimensions,
-    /// Something else than a code of positions.
-    #[error("no 1×C×H×W array of constants")]
+    /// The values are not a positional code.
+    #[error("not a constant 1×C×H×W array")]
     NoPositions,
-    /// Something else than one number.
+    /// The values are not one number.
     #[error("expected a number")]
     NoNumber,
-    /// Something else than a number for red, green and blue.
+    /// The values are not one number each for red, green and blue.
     #[error("expected three numbers")]
     NoColours,
-    /// It reads what no node before it gives.
+    /// The node's input is not an output of an earlier node.
     #[error("its input `{name}` is unknown")]
     UnknownInput {
-        /// The input's name; empty where there is none.
+        /// Name of the input; empty if it has none.
         name: String,
     },
-    /// It reads a constant that the file lacks.
+    /// The node's constant is missing in the file.
     #[error("its constant `{name}` is missing")]
     MissingConstant {
-        /// The constant's name; empty where there is none.
+        /// Name of the constant; empty if it has none.
         name: String,
     },
-    /// A constant of another type, or with other values than its dimensions say.
-    #[error("`{name}` does not hold the f32 values it says")]
+    /// The constant's type is wrong, or its values do not match its dimensions.
+    #[error("`{name}` does not hold the f32 values that its dimensions require")]
     Values {
-        /// The constant's name.
+        /// Name of the constant.
         name: String,
     },
-    /// A node without output.
-    #[error("it gives nothing")]
+    /// The node has no output.
+    #[error("it has no output")]
     NoOutput,
-    /// It has no name, or that of another.
-    #[error("every node needs a name of its own")]
+    /// The node has no name, or that of another node.
+    #[error("every node needs a unique name")]
     Name,
-    /// A constant that would have the name of something else.
-    #[error("its `{name}` is the name of something else too")]
+    /// A constant would have the name of something else.
+    #[error("its `{name}` is already the name of something else")]
     ConstantName {
         /// The name.
         name: String,
@@ -72,85 +72,85 @@ pub enum NodeProblem {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelProblem {
-    /// There is no such part.
+    /// The part is missing.
     #[error("missing")]
     Missing,
-    /// Another version of the format or of its operators.
+    /// The version of the format or of its operators differs.
     #[error("file layout {} with operators {:?}, expected {} with {:?}", found.layout, found.operators, expected.layout, expected.operators)]
     Version {
-        /// The file's.
+        /// Versions in the file.
         found: FormatVersion,
-        /// This program's.
+        /// Versions of this program.
         expected: FormatVersion,
     },
-    /// An entry that there must be.
+    /// A required entry is missing.
     #[error("`{key}` is missing")]
     MissingKey {
-        /// Its key.
+        /// Key of the entry.
         key: &'static str,
     },
-    /// An entry that must be a number.
+    /// An entry is not a number.
     #[error("`{key}` is `{value}`, expected a number")]
     NoNumber {
-        /// Its key.
+        /// Key of the entry.
         key: &'static str,
-        /// Its value.
+        /// Value of the entry.
         value: String,
     },
-    /// A constant that is another, read and written again.
-    #[error("`{name}` is not as this program writes it")]
+    /// A constant, read and written again, differs.
+    #[error("`{name}` differs from what this program writes")]
     Constant {
-        /// Its name.
+        /// Name of the constant.
         name: String,
     },
-    /// Fewer or more nodes and constants than belong to the network.
+    /// The number of nodes or constants is not that of the network.
     #[error("{found:?}, expected {expected:?}")]
     Counts {
-        /// Those of the file.
+        /// Numbers in the file.
         found: [usize; 2],
-        /// Those of the network.
+        /// Numbers of the network.
         expected: [usize; 2],
     },
     /// The file ends within the network.
-    #[error("they end before the depth")]
+    #[error("they end before the depth output")]
     EndsEarly,
-    /// The input's size is left open, or it is no picture.
-    #[error("no 1×H×W×3 picture of a fixed size")]
+    /// The input's size is not fixed, or the input is not a picture.
+    #[error("not a 1×H×W×3 picture of fixed size")]
     NoSize,
-    /// The input is another.
-    #[error("no 1×H×W×3 picture of bytes named `image`")]
+    /// The input is not the expected one.
+    #[error("not a 1×H×W×3 picture of bytes named `image`")]
     NoPicture,
-    /// The outputs are others.
+    /// The outputs are not the expected ones.
     #[error("not `depth` and `disparity` of 1×1×H×W")]
     NoDepth,
-    /// An output that a depth model has.
+    /// An output of a depth model is missing.
     #[error("no `{name}`")]
     NoOutput {
-        /// Its name.
+        /// Name of the output.
         name: &'static str,
     },
-    /// A model of several inputs, or of none.
-    #[error("{found} of them, expected one picture")]
+    /// The model does not have exactly one input.
+    #[error("found {found}, expected one picture")]
     Inputs {
-        /// How many.
+        /// Number of inputs.
         found: usize,
     },
-    /// Two distances that are no range of depths.
+    /// The two distances are not a range of depths.
     #[error("{} m to {} m, expected 0 < nearest < farthest, both finite", range.min_m, range.max_m)]
     Range {
         /// The distances.
         range: DepthRange,
     },
-    /// An output that is no map of the image's size.
+    /// The output is not a map of the image's size.
     #[error("{} channels at {}, expected one at the image's size", shape.channels, size_of(shape))]
     Output {
-        /// Its shape.
+        /// Shape of the output.
         shape: ValueShape,
     },
-    /// A network of several outputs, or of none.
-    #[error("{found}, expected one")]
+    /// The network does not have exactly one output.
+    #[error("found {found}, expected one")]
     Outputs {
-        /// How many.
+        /// Number of outputs.
         found: usize,
     },
 }
@@ -159,9 +159,9 @@ pub enum ModelProblem {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct FormatVersion {
-    /// Of the layout.
+    /// Version of the layout.
     pub layout: i64,
-    /// Of the operators.
+    /// Versions of the operator sets.
     pub operators: Vec<OperatorSet>,
 }
 
@@ -169,40 +169,40 @@ pub struct FormatVersion {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct OperatorSet {
-    /// Whose; empty for ONNX's own.
+    /// Domain of the set; empty for ONNX's own.
     pub domain: String,
-    /// Its version.
+    /// Version of the set.
     pub version: i64,
 }
 
-/// Why a file is no ONNX Runtime library that can be used.
+/// Why a file is not a usable ONNX Runtime library.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LibraryProblem {
-    /// Nothing is there.
-    #[error("there is no such file")]
+    /// The file does not exist.
+    #[error("no such file")]
     Missing,
-    /// A library of something else.
+    /// The file is a library of another program.
     #[error("it has no entry point `OrtGetApiBase`")]
     NoEntryPoint,
-    /// Its entry point leads nowhere.
-    #[error("its entry point gives nothing")]
+    /// The entry point returns nothing.
+    #[error("its entry point returns nothing")]
     EmptyEntryPoint,
-    /// A library that is too old.
+    /// The library is too old.
     #[error("it is version {found}, expected 1.{oldest} or later")]
     Version {
-        /// Its version.
+        /// Version of the library.
         found: String,
-        /// The second number of the oldest that will do.
+        /// The second number of the oldest usable version.
         oldest: u32,
     },
-    /// The process has opened another one.
-    #[error("this process already uses {}, and can use one only", path.display())]
+    /// The process has opened another library.
+    #[error("this process already uses {}, and can use only one library", path.display())]
     AnotherInUse {
-        /// That one's file.
+        /// Path of that library.
         path: PathBuf,
     },
-    /// What the system, or the library itself, says.
+    /// The message of the system, or of the library itself.
     #[error("{0}")]
     Refused(#[source] Box<dyn std::error::Error + Send + Sync>),
 }

@@ -1,6 +1,6 @@
-//! The messages of an ONNX file that are needed here, with the field numbers of `onnx.proto`.
+//! The messages of an ONNX file that this crate needs, with the field numbers of `onnx.proto`.
 //!
-//! ONNX is written in proto2: numbers in attributes are optional, so that a zero is written too, and lists of
+//! ONNX uses proto2: numbers in attributes are optional, so a zero is written as well, and lists of
 //! numbers are not packed.
 
 /// Element type of 32-bit floating-point numbers.

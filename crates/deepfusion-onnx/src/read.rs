@@ -15,9 +15,9 @@ use crate::{
     DepthModel, Error, FocalLength, FormatVersion, ModelProblem, NodeProblem, OperatorSet,
 };
 
-/// The model in an ONNX file that [`write`](crate::write()) wrote.
+/// Reads the model from an ONNX file that [`write`](crate::write()) wrote.
 ///
-/// Nothing is guessed: the model is written again, and the result must be the network that was read.
+/// Nothing is guessed: the model is written again, and the result must equal the network that was read.
 ///
 /// # Errors
 /// [`Error::Decode`] for bytes that are not an ONNX file; [`Error::Node`] naming the first node, or
@@ -81,7 +81,7 @@ fn side(graph: &GraphProto, axis: usize) -> Result<usize, Error> {
         .ok_or_else(|| part("input", ModelProblem::NoSize))
 }
 
-/// That the file is what would be written for what was read; versions of the program and words may differ.
+/// Checks that the file equals what would be written for the model that was read; the program's version and descriptions may differ.
 fn compare(found: &ModelProto, graph: &GraphProto, expected: &ModelProto) -> Result<(), Error> {
     if found.ir_version != expected.ir_version || found.opset_import != expected.opset_import {
         let problem = ModelProblem::Version {
@@ -114,7 +114,7 @@ fn compare(found: &ModelProto, graph: &GraphProto, expected: &ModelProto) -> Res
     if types(&graph.output) != types(&wanted.output) {
         return Err(part("outputs", ModelProblem::NoDepth));
     }
-    // The rest of what was expected, where the file ends earlier.
+    // The expected nodes after the end of the file.
     let counts = |g: &GraphProto| [g.node.len(), g.initializer.len()];
     if counts(graph) != counts(wanted) {
         let problem = ModelProblem::Counts {
@@ -145,13 +145,13 @@ fn node_error(node: &NodeProto, reason: NodeProblem) -> Error {
     }
 }
 
-/// What an activation begins with, after a convolution.
+/// The operators with which an activation after a convolution begins.
 const ACTIVATIONS: [&str; 6] = ["Relu", "Elu", "Neg", "Div", "Tanh", "LeakyRelu"];
 
 struct Reader<'a> {
     nodes: Peekable<Iter<'a, NodeProto>>,
     constants: HashMap<&'a str, &'a TensorProto>,
-    /// The value of the graph that an array is.
+    /// The graph's value for a name of an array.
     values: HashMap<&'a str, ValueId>,
 }
 
@@ -165,7 +165,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The network, for images of this width.
+    /// Reads the network, for images of this width.
     fn network(mut self, width: usize) -> Result<Graph, Error> {
         for op in ["Transpose", "Cast", "Div"] {
             self.expect(op)?;
@@ -255,7 +255,7 @@ impl<'a> Reader<'a> {
         let dilations = node.attribute.iter().find(|a| a.name == "dilations");
         let dilation = dilations.and_then(|a| a.ints.first().copied());
         let mut last = node;
-        // By its name: what follows may also be an operation of its own.
+        // Checked by its name: the next `Add` may also be an operation of its own.
         let residual = match self.after_named(last, "Add", &format!("{}.add", node.name)) {
             Some(add) => {
                 last = add;
@@ -322,14 +322,14 @@ impl<'a> Reader<'a> {
         Ok((&node.name, Op::Depthwise(Box::new(op)), node))
     }
 
-    /// Its channels and its size tell what it is; that its values are the position's is seen when it is written again.
+    /// Number of channels and size identify it; that its values are the positions' is checked when it is written again.
     fn position(
         &self,
         node: &'a NodeProto,
         width: usize,
     ) -> Result<(&'a String, Op, &'a NodeProto), Error> {
         let code = self.constant(node, 0)?;
-        // Its sides are as large as it has values.
+        // The square root of the number of values gives its sides.
         floats(node, code)?;
         let side = |axis: usize| {
             let side = code.dims.get(axis).copied();
@@ -483,7 +483,7 @@ impl<'a> Reader<'a> {
         Err(node_error(node, NodeProblem::Expected { op }))
     }
 
-    /// The next node, where it is one of `ops` and goes on with what `before` gives.
+    /// The next node, if it is one of `ops` and takes `before` as its input.
     fn after(&mut self, before: &NodeProto, ops: &[&str]) -> Option<&'a NodeProto> {
         self.nodes.next_if(|node| {
             ops.contains(&node.op_type.as_str())
@@ -492,7 +492,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// The same, where it has this name.
+    /// The same, if it also has this name.
     fn after_named(&mut self, before: &NodeProto, op: &str, name: &str) -> Option<&'a NodeProto> {
         let next = self.nodes.peek();
         next.filter(|node| node.name == name)?;
@@ -517,7 +517,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// A number for red, green and blue.
+    /// One number each for red, green and blue.
     fn colours(&self, node: &NodeProto) -> Result<[f32; 3], Error> {
         let values = floats(node, self.constant(node, 1)?)?;
         values
@@ -533,7 +533,7 @@ fn floats(node: &NodeProto, tensor: &TensorProto) -> Result<Vec<f32>, Error> {
     })
 }
 
-/// Whether a `Resize` blends pixels.
+/// Whether a `Resize` interpolates.
 fn is_linear(node: &NodeProto) -> bool {
     let mode = node.attribute.iter().find(|a| a.name == "mode");
     mode.is_some_and(|a| a.s.as_deref() == Some(b"linear".as_slice()))

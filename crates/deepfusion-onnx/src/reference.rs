@@ -47,7 +47,7 @@ pub fn run(graph: &Graph, rgb: &[u8], width: usize, height: usize) -> Result<Vec
         width,
         height,
     };
-    // The last node that reads a value; what nobody reads any more is dropped.
+    // Index of the last node that reads each value; a value that is no longer needed is dropped.
     let mut last_use = vec![0; graph.nodes().len() + 1];
     for (i, node) in graph.nodes().iter().enumerate() {
         node.op.inputs().for_each(|value| last_use[value.0] = i);
@@ -230,7 +230,7 @@ impl Plan<'_> {
     }
 }
 
-/// Each channel by its own kernel.
+/// Filters each channel with its own kernel.
 fn depthwise(op: &Depthwise, x: &[f32], [_, height, width]: [usize; 3]) -> Vec<f32> {
     let taps = op.kernel * op.kernel;
     let within = |i: usize, k: usize, n: usize| {
@@ -287,7 +287,7 @@ fn enlarged(x: &[f32], [_, height, width]: [usize; 3]) -> Vec<f32> {
     y
 }
 
-/// Four channels to the four pixels of a block, cut to a size.
+/// Moves four channels to the four pixels of a block, then crops to a size.
 fn pixels_of_channels(
     x: &[f32],
     [channels, height, width]: [usize; 3],
@@ -306,7 +306,7 @@ fn pixels_of_channels(
     y
 }
 
-/// Each pixel of a block of `side`×`side` by the softmax of its nine weights over the pixels around the block's.
+/// Each pixel of a block of `side`×`side` as a mean of the pixels around the block's, weighted with the softmax of its nine weights.
 fn convex(value: &[f32], weights: &[f32], [_, height, width]: [usize; 3], side: usize) -> Vec<f32> {
     let mut y = Vec::with_capacity(value.len() * side * side);
     for row in 0..height * side {
@@ -333,7 +333,7 @@ fn convex(value: &[f32], weights: &[f32], [_, height, width]: [usize; 3], side: 
     y
 }
 
-/// Each pixel's channels to mean 0 and variance 1.
+/// Normalises each pixel's channels to mean 0 and variance 1.
 fn channel_norm(x: &[f32], [channels, height, width]: [usize; 3], epsilon: f32) -> Vec<f32> {
     let area = height * width;
     let along = |p: usize| x[p..].iter().step_by(area).take(channels);
@@ -352,7 +352,7 @@ fn channel_norm(x: &[f32], [channels, height, width]: [usize; 3], epsilon: f32) 
         .collect()
 }
 
-/// Each channel's mixture of its head's values.
+/// Each channel as a mixture of its head's values.
 fn cross_covariance(
     x: &[f32],
     [channels, height, width]: [usize; 3],
@@ -388,12 +388,12 @@ fn cross_covariance(
     y
 }
 
-/// In double precision: the order of many summands then does not show.
+/// Sums in double precision, so that the order of many summands has no visible effect.
 fn sum<'a>(values: impl IntoIterator<Item = &'a f32>) -> f64 {
     values.into_iter().map(|v| f64::from(*v)).sum()
 }
 
-/// Each plane with the pixel's value of that channel added.
+/// Adds to each plane the pixel's value of that channel.
 fn with_pixel(x: &[f32], pixel: &[f32]) -> Vec<f32> {
     let planes = x.chunks_exact((x.len() / pixel.len()).max(1)).zip(pixel);
     planes
@@ -419,7 +419,7 @@ fn max_pool(x: &[f32], [_, height, width]: [usize; 3]) -> Vec<f32> {
     y
 }
 
-/// Every pixel becomes 2×2.
+/// Doubles every pixel in both directions.
 fn doubled(x: &[f32], width: usize) -> Vec<f32> {
     let mut y = Vec::with_capacity(4 * x.len());
     for row in x.chunks_exact(width) {

@@ -16,10 +16,10 @@ use crate::proto::{
 };
 use crate::{DepthModel, Error, NodeProblem, OPSET};
 
-/// Version of the file layout; the first that holds [`OPSET`].
+/// Version of the file layout: the first that supports [`OPSET`].
 pub(crate) const IR_VERSION: i64 = 8;
 
-/// A message of protobuf cannot be larger.
+/// Largest size of a protobuf message, bytes.
 const MOST_BYTES: usize = i32::MAX as usize;
 
 /// The model as an ONNX file.
@@ -49,10 +49,10 @@ fn too_large(bytes: usize) -> Error {
     }
 }
 
-/// The model as a message.
+/// The model as a protobuf message.
 pub(crate) fn encode(model: &DepthModel) -> Result<ModelProto, Error> {
     model.validate()?;
-    // Before the weights are copied.
+    // Checked before the weights are copied.
     let weights = model.graph.nodes().iter().map(|node| match &node.op {
         Op::Conv(conv) => 4 * (conv.weight.len() + conv.bias.len()),
         Op::Depthwise(op) => 4 * (op.weight.len() + op.bias.len()),
@@ -141,7 +141,7 @@ fn metadata(model: &DepthModel, version: &str) -> Vec<StringStringEntryProto> {
             entries.push((CANONICAL, focal.fy.to_string()));
         }
     }
-    // What must be there stands last: a file that ends early is then never taken for a whole one.
+    // Required entries come last, so that a file that ends early is never taken as complete.
     entries.push(("depth_min_m", model.range.min_m.to_string()));
     entries.push(("depth_max_m", model.range.max_m.to_string()));
     let entry = |(key, value): (&str, String)| StringStringEntryProto {
@@ -168,7 +168,7 @@ struct Writer {
 }
 
 impl Writer {
-    /// Adds a node; what it gives bears its name.
+    /// Adds a node; its output has its name.
     fn emit(
         &mut self,
         op: &str,
@@ -208,7 +208,7 @@ impl Writer {
         Ok(name)
     }
 
-    /// A convolution's weights. A recurrent network's layers run several times: their weights are in the file once.
+    /// Adds a convolution's weights. A recurrent network's layers run several times: their weights are in the file once.
     fn weight(&mut self, node: &str, tensor: TensorProto) -> Result<String, Error> {
         let same =
             |other: &&TensorProto| other.dims == tensor.dims && other.raw_data == tensor.raw_data;
@@ -218,7 +218,7 @@ impl Writer {
         }
     }
 
-    /// A constant that many nodes share.
+    /// Adds a constant that many nodes share.
     fn shared(&mut self, tensor: TensorProto) -> Result<String, Error> {
         if self.initializers.contains(&tensor) {
             return Ok(tensor.name);
@@ -246,7 +246,7 @@ impl Writer {
         Ok(())
     }
 
-    /// σ → 1/D_max + (1/D_min − 1/D_max)·σ → 1 / that.
+    /// σ → 1/D_max + (1/D_min − 1/D_max)·σ → the reciprocal of that.
     fn depth(&mut self, model: &DepthModel) -> Result<(), Error> {
         let [far, span] = model.disparity_terms();
         let sigmoid = self.value(model.graph.outputs()[0]);

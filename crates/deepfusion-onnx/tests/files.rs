@@ -1,4 +1,4 @@
-//! What is written is what is read, and nothing else is read.
+//! A written file is read back unchanged, and no other file is read.
 
 use std::collections::HashSet;
 
@@ -23,7 +23,7 @@ proptest! {
         let at = at.index(bytes.len());
         bytes[at] ^= 1_u8 << bit;
         if let Ok(again) = read(&bytes) {
-            // A bit of a weight, of the range, of a word for people: still a model of the same layers. One that
+            // A bit of a weight, of the range, or of a description: still a model of the same layers. One that
             // the output does not need may be lost: a bit of its field's number makes it one that readers skip.
             prop_assert_eq!(needed(&again.graph), needed(&model.graph));
             prop_assert!(again.validate().is_ok());
@@ -78,7 +78,7 @@ fn single(change: impl FnOnce(&mut Conv)) -> DepthModel {
     }
 }
 
-/// Replaces a word of the file by one of the same length.
+/// Replaces a word of the file by one of equal length.
 fn with(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
     assert_eq!(from.len(), to.len());
     let at = bytes
@@ -97,7 +97,7 @@ fn other_networks_are_refused_by_the_node() {
         Err(Error::Node { name, op, .. }) => format!("{name} {op}"),
         other => panic!("{from} → {to}: {other:?}"),
     };
-    // Each of these is a valid file of another meaning.
+    // Each of these is a valid file with another meaning.
     assert_eq!(
         node("only.exp\"\u{3}Exp", "only.exp\"\u{3}Log"),
         "only.exp Log"
@@ -138,7 +138,7 @@ fn another_version_is_refused_by_both() {
     assert_eq!(found.operators, expected.operators);
 }
 
-/// An image of odd sides, halved rounding up, and enlarged again by channels that become pixels.
+/// An image with odd sides, halved with rounding up, and enlarged again by turning channels into pixels.
 #[test]
 fn channels_become_pixels_and_are_cut() {
     let mut graph = Graph::new([0.5; 3], [0.5; 3]);
@@ -195,7 +195,7 @@ fn channels_become_pixels_and_are_cut() {
             assert_eq!(pixels[7 * y + x], expected, "{x} {y}");
         }
     }
-    // Where nothing is to be cut, nothing is.
+    // If nothing has to be cropped, nothing is.
     let even = DepthModel {
         width: 8,
         height: 6,
@@ -225,7 +225,7 @@ fn models_that_cannot_be_written_are_refused() {
     let mut model = single(|_| ());
     model.width = 1;
     assert!(part(&model).contains("1x4"));
-    // Two nodes of one name, and a name that the file needs itself.
+    // Two nodes of one name, and a name that the file itself needs.
     for name in ["only", "depth", "image", ""] {
         let mut model = single(|_| ());
         let input = ValueId(1);
@@ -322,7 +322,7 @@ fn pooling_and_enlarging() {
     assert_eq!(outputs[1][48..52], unit(&[0, 1, 2, 3]));
 }
 
-/// Every operation of an attention's path on numbers that can be followed by hand.
+/// Every operation on the path of an attention, on numbers that can be followed by hand.
 #[test]
 fn means_masks_and_concatenations() {
     let mut graph = Graph::new([0.0; 3], [1.0; 3]);
@@ -374,7 +374,7 @@ fn means_masks_and_concatenations() {
     close(&outputs[1][..4], &means);
     close(&outputs[1][8..12], &[0.4, 0.4, 0.4, 0.6]);
     close(&outputs[2][..4], &[2.0 / 3.0, 0.0, 0.0, 0.0]);
-    // Green's first pixel: 0.4 · (2/3 · 0.4), and its own value more.
+    // Green's first pixel: 0.4 · (2/3 · 0.4), plus its own value.
     close(&outputs[3][8..10], &[0.4 * 0.4 * 2.0 / 3.0, 0.0]);
     close(&outputs[4][8..10], &[0.4 + 0.4 * 0.4 * 2.0 / 3.0, 0.4]);
     close(&outputs[5][8..10], &[0.8, 0.8]);

@@ -1,4 +1,4 @@
-//! ONNX files, read and run.
+//! Reading and running ONNX files.
 
 #![allow(
     clippy::unwrap_used,

@@ -37,7 +37,7 @@ def engines(path):
     try:
         import openvino
     except ImportError:
-        print("openvino is not installed: left out")
+        print("skipped: openvino is not installed")
         return
     model = openvino.Core().compile_model(path, "CPU", {"INFERENCE_PRECISION_HINT": "f32"})
 

@@ -1,4 +1,4 @@
-//! Files in ONNX Runtime, if this machine has one; the messages if it has none.
+//! Files in ONNX Runtime, if this machine has one; else the error messages.
 
 #![cfg(feature = "runtime")]
 
@@ -12,7 +12,7 @@ use deepfusion_onnx::check::{deviation, pictures};
 use deepfusion_onnx::runtime::{OrtEngine, find};
 use deepfusion_onnx::{DepthMaps, DepthModel, Error, reference, write};
 
-/// The library, or the message without one.
+/// The library; `None`, with the message printed, if there is none.
 fn library_is_here() -> bool {
     match find(None) {
         Ok(library) => {
@@ -56,7 +56,7 @@ fn random_networks_are_what_the_reference_says() {
         let apart = deviation(&found, &expected);
         worst = worst.max(apart.worst());
         assert!(apart.worst() < 5e-6, "seed {seed}: {apart:?}");
-        // Disparity alone is the same.
+        // Disparity alone gives the same values.
         let mut alone = vec![0.0; model.width * model.height];
         engine.run(&pictures[0], &mut alone).unwrap();
         assert_eq!(alone, found[0].disparity);
@@ -71,7 +71,7 @@ fn random_networks_are_what_the_reference_says() {
     eprintln!("largest deviation {worst:.1e}");
 }
 
-/// ONNX Runtime's own `Sigmoid` would be 1e-4 away here: at the far end σ is nearly 0, and counts 900-fold.
+/// ONNX Runtime's own `Sigmoid` would be off by 1e-4 here: at the far end σ is nearly 0, and its error counts 900-fold.
 #[test]
 fn the_far_end_of_the_range_is_exact() {
     if !library_is_here() {
@@ -142,7 +142,7 @@ fn wrong_sizes_and_models_are_refused() {
         let error = OrtEngine::load(None, bad, 1);
         assert!(matches!(error, Err(Error::Runtime { .. })), "{error:?}");
     }
-    // Another library cannot be used beside the one that is open.
+    // No other library can be used while one is open.
     let other = OrtEngine::load(Some(Path::new("/nowhere/libonnxruntime.so")), &bytes, 1);
     assert!(matches!(other, Err(Error::Library { .. })), "{other:?}");
 }
@@ -152,7 +152,7 @@ fn files_that_are_no_library_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let text = folder.path().join("libonnxruntime.so");
     std::fs::write(&text, "no library").unwrap();
-    // A library, but another one: this test itself is linked against it.
+    // A library, but not ONNX Runtime: this test itself is linked against it.
     let mut wrong = vec![
         text,
         folder.path().to_owned(),
@@ -178,7 +178,7 @@ fn files_that_are_no_library_are_named() {
     }
 }
 
-/// Libraries with the right entry point that cannot be used all the same: too old, or damaged.
+/// Libraries with the right entry point that are nevertheless unusable: too old, or damaged.
 #[test]
 fn unusable_versions_are_reported() {
     let folder = tempfile::tempdir().unwrap();
@@ -207,7 +207,7 @@ fn unusable_versions_are_reported() {
         let expected = if name == "old" {
             "it is version 1.16.3, expected 1.17 or later"
         } else {
-            "gives nothing"
+            "returns nothing"
         };
         assert!(error.contains(expected), "{error}");
     }

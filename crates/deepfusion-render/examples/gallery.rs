@@ -93,7 +93,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let depth = simulation.frame(i).depth;
         let truth = Grid::from(&depth);
         let name = format!("{i:010}");
-        // Where the truth has no depth, neither has the guess: any number will do.
+        // Where the truth has no depth, the guess has none either, so any number will do.
         let filled = tilted(&depth)
             .data
             .iter()

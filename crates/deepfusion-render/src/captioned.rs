@@ -11,7 +11,7 @@ const GAP: u32 = 6;
 /// A picture with its caption.
 #[derive(Debug, Clone)]
 pub struct Tile {
-    /// What it shows.
+    /// The caption.
     pub caption: String,
     /// The picture.
     pub picture: RgbImage,
@@ -28,7 +28,7 @@ impl Tile {
     }
 }
 
-/// Pictures in rows of `columns` (at least 1), each under its caption; columns are as wide as the widest picture, rows as
+/// Pictures in rows of `columns` (at least 1), each above its caption; columns are as wide as the widest picture, rows as
 /// high as their highest.
 #[must_use]
 pub fn sheet(tiles: &[Tile], columns: usize) -> RgbImage {
@@ -72,7 +72,7 @@ pub fn model_sheet(rows: &[Vec<Tile>], scale: &DepthScale) -> RgbImage {
     for row in rows {
         let cut = |t: &Tile| Tile::new(cut(&t.caption, most), t.picture.clone());
         tiles.extend(row.iter().map(cut));
-        // A row that ends early must not pull up the next.
+        // The next row begins below a row that ends early.
         tiles.resize(
             tiles.len().next_multiple_of(columns.max(1)),
             Tile::new("", RgbImage::new(0, 0)),
@@ -81,7 +81,7 @@ pub fn model_sheet(rows: &[Vec<Tile>], scale: &DepthScale) -> RgbImage {
     with_depth_legend(&sheet(&tiles, columns), scale)
 }
 
-/// At most `most` letters, the last of them dots where there were more.
+/// At most `most` letters; if there are more, the last ones are replaced by dots.
 fn cut(text: &str, most: usize) -> String {
     if text.chars().count() <= most {
         return text.to_owned();

@@ -9,7 +9,7 @@ use crate::text::{TextSize, draw_text};
 /// A viewpoint of a cloud. The cloud is in the camera's axes: x right, y down, z forward, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CloudView {
-    /// From straight above, a map: `ahead_m` metres ahead from bottom to top, with lines every ten metres.
+    /// From straight above, as a map: `ahead_m` metres ahead from bottom to top, with lines every ten metres.
     BirdsEye {
         /// How far ahead the picture reaches, in metres.
         ahead_m: f64,
@@ -20,7 +20,7 @@ pub enum CloudView {
         eye_m: [f64; 3],
         /// The point it looks at.
         at_m: [f64; 3],
-        /// Field of view from left to right, in radians.
+        /// Horizontal field of view, in radians.
         fov_rad: f64,
     },
 }
@@ -76,7 +76,7 @@ pub fn render_cloud(cloud: &PointCloud, view: &CloudView, width: u32, height: u3
     canvas.picture
 }
 
-/// A point to a pixel.
+/// Projects a point to a pixel.
 struct Projection {
     eye: Vector3<f64>,
     /// Rows: right, down, forward of the picture.
@@ -92,7 +92,7 @@ impl Projection {
         let (width, height) = (f64::from(width), f64::from(height));
         match *view {
             CloudView::BirdsEye { ahead_m } => Self {
-                // High above: "near" is then what is higher.
+                // The camera is high above: a higher point is nearer.
                 eye: Vector3::new(0.0, -100.0, 0.0),
                 axes: [Vector3::x(), -Vector3::z(), Vector3::y()],
                 centre: (width / 2.0, height - 1.0),
@@ -122,7 +122,7 @@ impl Projection {
         }
     }
 
-    /// Column, row, distance along the view, and pixels per metre there; `None` behind the eye.
+    /// Column, row, distance along the view, and pixels per metre at this distance; `None` behind the eye.
     fn project(&self, point: &Vector3<f64>) -> Option<(f64, f64, f64, f64)> {
         let seen = point - self.eye;
         let [right, down, forward] = self.axes.map(|axis| axis.dot(&seen));
@@ -146,7 +146,7 @@ struct Canvas {
 }
 
 impl Canvas {
-    /// A filled square about (u, v), where nothing nearer is.
+    /// Draws a filled square around (u, v) where nothing nearer is.
     fn square(&mut self, u: f64, v: f64, distance: f64, size: f64, colour: Rgb<u8>) {
         let (width, height) = self.picture.dimensions();
         let (left, top) = ((u - size / 2.0).round(), (v - size / 2.0).round());
@@ -249,7 +249,7 @@ mod tests {
             let picture = render_cloud(&cloud(&order.map(|i| points[i])), &view, 100, 60);
             assert_eq!(picture.get_pixel(50, 30).0, RED);
         }
-        // Right is right and down is down; what is behind the eye is not seen.
+        // Right is right and down is down; points behind the eye are not drawn.
         let picture = render_cloud(
             &cloud(&[([1.0, 0.5, 5.0], RED), ([0.0, 0.0, -5.0], BLUE)]),
             &view,

@@ -47,7 +47,7 @@ fn of(gradient: &dyn Gradient, t: f32) -> Rgb<u8> {
     Rgb([r, g, b])
 }
 
-/// Where there is no depth.
+/// The colour of pixels without depth.
 pub(crate) const NOTHING: Rgb<u8> = Rgb([40, 40, 44]);
 
 /// The colour scale of depth: logarithmic, red at `near_m`, blue at `far_m`, clamped beyond.
@@ -80,14 +80,14 @@ impl DepthScale {
     #[must_use]
     pub fn colour(&self, depth_m: f32) -> Rgb<u8> {
         if depth_m > 0.0 {
-            // Turbo's ends are nearly black: the range without them keeps near and far apart from "nothing".
+            // Turbo's ends are nearly black: without them, near and far differ from "no depth".
             ColourMap::Turbo.colour(0.95 - 0.88 * self.place(depth_m))
         } else {
             NOTHING
         }
     }
 
-    /// Round depths for a legend, in metres: 1, 2, 5 times powers of ten between the ends, and the ends where they are
+    /// Round depths for a legend, in metres: 1, 2, 5 times powers of ten between the ends, and the ends if they are
     /// round themselves; from near to far.
     #[must_use]
     pub fn ticks_m(&self) -> Vec<f32> {
@@ -96,7 +96,7 @@ impl DepthScale {
             .flat_map(|power| [1.0, 2.0, 5.0].map(|digit| digit * 10f32.powi(power)))
             .filter(inside)
             .collect();
-        // 80 m is the field's cap and no 1-2-5 number.
+        // 80 m is the field's cap, but not a 1-2-5 number.
         if self.far_m >= 1.3 * ticks.last().copied().unwrap_or(0.0) {
             ticks.push(self.far_m);
         }

@@ -7,7 +7,7 @@ use crate::error::require_size;
 use crate::panel::picture_from_chw;
 use crate::{ColourMap, Result};
 
-/// An error of this factor, up or down, has the strongest colour.
+/// An error by this factor, up or down, has the strongest colour.
 const WORST_FACTOR: f32 = 1.5;
 
 /// Input and output of a training step for one image with known depth: planes of `width` × `height`, row by row.
@@ -23,14 +23,14 @@ pub struct DepthPanel<'a> {
     pub disparity: &'a [f32],
     /// The true disparity, H×W, NaN where unknown.
     pub truth: &'a [f32],
-    /// ln of predicted over true depth, H×W, 0 where nothing is known.
+    /// ln of predicted over true depth, H×W, 0 where the truth is unknown.
     pub error: &'a [f32],
 }
 
 /// Image, both disparities, and the error (red: too far, blue: too near) with their captions.
 ///
 /// # Errors
-/// [`crate::Error::Size`] naming the part that has another size than the image.
+/// [`crate::Error::Size`] naming the part whose size differs from the image's.
 pub fn depth_panel(panel: &DepthPanel<'_>) -> Result<RgbImage> {
     let size @ (width, height) = (panel.width, panel.height);
     require_size("error", panel.error.len(), size)?;

@@ -42,13 +42,13 @@ pub fn with_depth_legend(picture: &RgbImage, scale: &DepthScale) -> RgbImage {
     with_legend(picture, &colour, &ticks)
 }
 
-/// The scale's bar of colours alone, with depths in metres.
+/// The scale's colour bar alone, with depths in metres.
 #[must_use]
 pub fn depth_legend(width: u32, scale: &DepthScale) -> RgbImage {
     with_depth_legend(&RgbImage::new(width, 0), scale)
 }
 
-/// A colour bar under a picture. `colour` maps [0, 1] to the bar's colours, `ticks` are places in [0, 1] and labels.
+/// A colour bar under a picture. `colour` maps [0, 1] to the bar's colours, `ticks` are positions in [0, 1] with labels.
 pub(crate) fn with_legend(
     picture: &RgbImage,
     colour: &dyn Fn(f32) -> Rgb<u8>,
@@ -71,7 +71,7 @@ pub(crate) fn with_legend(
     for (place, label) in ticks {
         let x = margin + (place * (length - 1) as f32).round() as u32;
         let half = text_width(label, size) / 2;
-        // Labels at the ends are pushed inside (pages round a picture's corners), those that would touch their neighbour
+        // Labels at the ends are moved inside (pages round a picture's corners); those that would touch their neighbour
         // are left out.
         let inset = size.height() / 2;
         let left = x
@@ -98,10 +98,10 @@ pub(crate) fn with_legend(
     out
 }
 
-/// The image and its depth with a legend: beside each other, or above each other where the image is wide.
+/// The image and its depth with a legend: side by side, or one above the other if the image is wide.
 ///
 /// # Errors
-/// [`crate::Error::Size`] where the depth map has another size than the image.
+/// [`crate::Error::Size`] if the depth map's size differs from the image's.
 pub fn side_by_side(image: &RgbImage, depth: &DepthMap, scale: &DepthScale) -> Result<RgbImage> {
     let (width, height) = image.dimensions();
     require_size("depth map", depth.data.len(), (width, height))?;
@@ -128,7 +128,7 @@ pub(crate) fn from_pixels<T>(
     out
 }
 
-/// The value below which the share `p` of the finite values lies; 0 of none.
+/// The value below which the share `p` of the finite values lies; 0 for none.
 pub(crate) fn percentile(values: &[f32], p: f32) -> f32 {
     let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
     if finite.is_empty() {

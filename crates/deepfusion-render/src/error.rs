@@ -1,28 +1,28 @@
 use deepfusion_hint::{Hint, count_of, system_hint};
 
-/// What can go wrong while a picture or a report is made.
+/// What can go wrong when a picture or a report is made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Two things that belong together are of different sizes.
+    /// Two things that belong together differ in size.
     #[error("{what} has {}, expected {}×{}", count_of(*found, "value"), expected.0, expected.1)]
     Size {
-        /// What does not fit.
+        /// The part whose size is wrong.
         what: &'static str,
-        /// How many values it has.
+        /// Number of values it has.
         found: usize,
-        /// How many it should have: so many a row, and rows.
+        /// Expected width and height.
         expected: (u32, u32),
     },
     /// A picture cannot be encoded.
     #[error("a picture of the report cannot be encoded")]
     Encode(#[from] image::ImageError),
-    /// A run's log that cannot be shown.
+    /// A run's log cannot be shown.
     #[error("{}: {problem}", path.display())]
     Log {
-        /// The file.
+        /// Path of the file.
         path: std::path::PathBuf,
-        /// What is wrong with it.
+        /// What is wrong with the file.
         problem: LogProblem,
     },
     /// A file cannot be read or written.
@@ -34,13 +34,13 @@ pub enum Error {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogProblem {
-    /// It is no table: what the parser said.
+    /// The file is not a table; the parser's error.
     #[error(transparent)]
     Csv(#[from] csv::Error),
-    /// It lacks a column.
+    /// A column is missing.
     #[error("no column `{0}`")]
     NoColumn(&'static str),
-    /// A line before the last is not whole.
+    /// A line before the last is incomplete.
     #[error("line {0}: no step, or too few cells")]
     Line(u64),
 }
@@ -52,7 +52,7 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::File(inner) => inner.hint(),
-            Self::Log { .. } => Some("it should be the log.csv of a run's folder".into()),
+            Self::Log { .. } => Some("give the log.csv of a run's folder".into()),
             Self::Encode(image::ImageError::IoError(source)) => {
                 Some(system_hint(source.kind()).into())
             }
@@ -61,7 +61,7 @@ impl Hint for Error {
     }
 }
 
-/// Fails where `found` is not width × height.
+/// An error unless `found` is width × height.
 pub(crate) fn require_size(what: &'static str, found: usize, expected: (u32, u32)) -> Result<()> {
     if found == expected.0 as usize * expected.1 as usize {
         return Ok(());

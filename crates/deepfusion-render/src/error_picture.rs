@@ -5,15 +5,15 @@ use crate::depth_picture::with_legend;
 use crate::error::require_size;
 use crate::{ColourMap, DepthScale, Result};
 
-/// Relative error at the ends of the colours.
+/// Relative error at the ends of the colour scale.
 const END: f32 = 0.3;
 
 /// Signed relative error (prediction − truth) / truth where there is ground truth, drawn on the darkened image with a
-/// legend: blue: the prediction is too near, red: too far, white: correct; ±30 % at the ends. Dots grow with the
+/// legend. Blue: the prediction is too near; red: too far; white: correct; ±30 % at the ends. Dots grow with the
 /// image, since ground truth is sparse.
 ///
 /// # Errors
-/// [`crate::Error::Size`] where a map has another size than the image.
+/// [`crate::Error::Size`] if a map's size differs from the image's.
 pub fn error_picture(
     image: &RgbImage,
     prediction: &DepthMap,
@@ -44,7 +44,7 @@ pub fn error_picture(
 /// Sparse depth in colours on the darkened image, without a legend; dots as in [`error_picture`].
 ///
 /// # Errors
-/// [`crate::Error::Size`] where the map has another size than the image.
+/// [`crate::Error::Size`] if the map's size differs from the image's.
 pub fn sparse_depth_picture(
     image: &RgbImage,
     depth: &DepthMap,
@@ -54,7 +54,7 @@ pub fn sparse_depth_picture(
     Ok(dots(image, depth, |_, metres| Some(scale.colour(metres))))
 }
 
-/// The darkened image with a dot wherever there is ground truth and `colour` (of its index and depth) gives one.
+/// The darkened image with a dot for each pixel with ground truth for which `colour` (of its index and depth) gives one.
 fn dots(
     image: &RgbImage,
     ground_truth: &DepthMap,
@@ -67,7 +67,7 @@ fn dots(
         let grey = ((r * 77 + g * 150 + b * 29) >> 8) as u8 / 3;
         *pixel = Rgb([grey; 3]);
     }
-    // A dense truth needs no dots larger than a pixel.
+    // Dense truth needs no dots larger than a pixel.
     let dense = ground_truth.count() * 2 > ground_truth.data.len();
     let dot = if dense { 1 } else { (width / 400).max(2) };
     for (i, &truth) in ground_truth.data.iter().enumerate() {

@@ -4,11 +4,11 @@ use crate::depth_picture::percentile;
 use crate::error::require_size;
 use crate::{ColourMap, Result};
 
-/// How much of a pixel is the map's colour; the rest is the picture in grey.
+/// Share of the map's colour in a pixel; the rest is the picture in grey.
 const OPACITY: f32 = 0.6;
 
-/// A coarse map (H×W, row by row, of any size) laid over a picture: the picture in grey shows where, the colours
-/// how much, dark blue for `range[0]` and red for `range[1]`. Between its pixels the map is interpolated.
+/// A coarse map (H×W, row by row, of any size) laid over a picture. The picture is grey, the colours show the map's
+/// values, from dark blue for `range[0]` to red for `range[1]`. The map is interpolated between its pixels.
 ///
 /// # Errors
 /// [`crate::Error::Size`] unless `map` has `width * height` values.
@@ -49,7 +49,7 @@ pub fn feature_range(map: &[f32]) -> [f32; 2] {
     [0.02, 0.98].map(|share| percentile(map, share))
 }
 
-/// For every pixel of the picture the two of the map beside it and the share of the second, half-pixel centres.
+/// For every pixel of the picture the two nearest of the map, and the weight of the second, with half-pixel centres.
 fn axis(from: usize, to: u32) -> Vec<(usize, usize, f32)> {
     let place = |i: u32| {
         let p = (i as f32 + 0.5) * from as f32 / to as f32 - 0.5;

@@ -4,13 +4,13 @@ use crate::Result;
 use crate::depth_picture::{from_pixels, percentile};
 use crate::error::require_size;
 
-/// An optical flow in the field's colours: the hue is the direction (red to the right, then yellow, green, blue
-/// clockwise), the saturation the length, full at the 98th percentile. White does not move.
+/// An optical flow in the usual colours: the hue is the direction (red to the right, then yellow, green, blue
+/// clockwise), the saturation the length, full at the 98th percentile. White means no motion.
 ///
 /// Returns the picture and the length of full saturation, in pixels.
 ///
 /// # Errors
-/// [`crate::Error::Size`] where `flow` is not 2×H×W.
+/// [`crate::Error::Size`] if `flow` is not 2×H×W.
 pub fn flow_picture(flow: &[f32], width: u32, height: u32) -> Result<(RgbImage, f32)> {
     require_size("flow", flow.len(), (2 * width, height))?;
     let (u, v) = flow.split_at(flow.len() / 2);
@@ -25,7 +25,7 @@ pub fn flow_picture(flow: &[f32], width: u32, height: u32) -> Result<(RgbImage, 
     Ok((picture, full))
 }
 
-/// The brightest colour of a hue, in turns from red over yellow, and a saturation.
+/// The brightest colour of a hue, in turns from red over yellow, with a saturation.
 fn bright(hue: f32, saturation: f32) -> Rgb<u8> {
     Rgb([0.0, 1.0 / 3.0, 2.0 / 3.0].map(|of| {
         let away = (hue - of).abs();
@@ -41,12 +41,12 @@ mod tests {
 
     #[test]
     fn the_hue_is_the_direction_and_white_stands_still() {
-        // Right, down, left, and nothing.
+        // Right, down, left, and no motion.
         let flow = [4.0, 0.0, -4.0, 0.0, 0.0, 4.0, 0.0, 0.0];
         let (picture, full) = flow_picture(&flow, 4, 1).unwrap();
         assert!((full - 4.0).abs() < 1e-6, "{full}");
         assert_eq!(picture.get_pixel(0, 0).0, [255, 0, 0]);
-        // A quarter turn on from red lies between yellow and green.
+        // A quarter turn from red lies between yellow and green.
         let [r, g, b] = picture.get_pixel(1, 0).0;
         assert!(g == 255 && (120..136).contains(&r) && b == 0, "{r} {g} {b}");
         assert_eq!(picture.get_pixel(2, 0).0, [0, 255, 255]);

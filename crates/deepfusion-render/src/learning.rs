@@ -14,7 +14,7 @@ pub struct LearningLog {
 struct Row {
     step: f64,
     validation: bool,
-    /// In the order of the columns; NaN where a cell is empty or does not parse.
+    /// Values by column, in the order of the columns; NaN if a cell is empty or does not parse.
     values: Vec<f64>,
 }
 
@@ -62,7 +62,7 @@ impl LearningLog {
                         .map(|c| number(*c).unwrap_or(f64::NAN))
                         .collect(),
                 }),
-                // Forgiven at the end: a run that was killed while it wrote.
+                // Accepted in the last line: the run may have been killed while writing it.
                 _ => broken = Some(record.position().map_or(0, csv::Position::line)),
             }
         }
@@ -85,7 +85,7 @@ impl LearningLog {
         self.rows.iter().map(|r| r.step).fold(0.0, f64::max)
     }
 
-    /// Step and value of a column, of the training lines or of the validations. Empty where there is no such column.
+    /// Step and value of a column, of the training lines or of the validations. Empty if there is no such column.
     #[must_use]
     pub fn series(&self, column: &str, validation: bool) -> Vec<(f64, f64)> {
         let Some(place) = self.columns.iter().position(|c| c == column) else {
@@ -95,7 +95,7 @@ impl LearningLog {
         rows.map(|r| (r.step, r.values[place])).collect()
     }
 
-    /// Whether a column is zero, or nothing, throughout.
+    /// Whether a column is zero or empty throughout.
     pub(crate) fn is_zero(&self, column: &str) -> bool {
         let some = |(_, v): &(f64, f64)| v.is_finite() && *v != 0.0;
         ![true, false]

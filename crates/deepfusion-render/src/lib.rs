@@ -1,6 +1,6 @@
 //! Pictures of depth, errors and clouds, and the HTML report. Plain slices and `image` pictures, no tensors.
 //!
-//! Depth is shown by the logarithm of metres, warm near and cold far, with a legend in metres ([`DepthScale`]);
+//! Depth is shown on a logarithmic scale, warm near and cold far, with a legend in metres ([`DepthScale`]);
 //! disparity without a unit in magma, bright near. Text is drawn in a bitmap font ([`draw_text`]).
 
 mod captioned;

@@ -23,7 +23,7 @@ pub struct SamplePanel<'a> {
     pub error: &'a [f32],
     /// Weight of each pixel's warp in the loss, H×W: 1 used, 0 masked out.
     pub mask: &'a [f32],
-    /// The optical flow to the source, 2×H×W in pixels, where one is learned.
+    /// The optical flow to the source, 2×H×W in pixels, if one is learned.
     pub flow: Option<&'a [f32]>,
     /// 1 where a pixel counts as dynamic, H×W, if such pixels are masked.
     pub moving: Option<&'a [f32]>,
@@ -33,7 +33,7 @@ pub struct SamplePanel<'a> {
 /// for watching a training run.
 ///
 /// # Errors
-/// [`crate::Error::Size`] naming the part that has another size than the image.
+/// [`crate::Error::Size`] naming the part whose size differs from the image's.
 pub fn sample_panel(panel: &SamplePanel<'_>) -> Result<RgbImage> {
     let size @ (width, height) = (panel.width, panel.height);
     require_size("photometric error", panel.error.len(), size)?;

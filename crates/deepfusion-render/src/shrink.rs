@@ -2,7 +2,7 @@ use deepfusion_geometry::DepthMap;
 use image::RgbImage;
 use image::imageops::{self, FilterType};
 
-/// The picture at most `widest` pixels wide, with its own proportions.
+/// The picture scaled to at most `widest` pixels wide, with the same proportions.
 #[must_use]
 pub fn shrink_picture(picture: &RgbImage, widest: u32) -> RgbImage {
     let size = shrunk_size(picture.dimensions(), widest);
@@ -21,7 +21,7 @@ pub(crate) fn shrunk_size((width, height): (u32, u32), widest: u32) -> (u32, u32
     (widest, (shrunk.round() as u32).max(1))
 }
 
-/// Depth at a smaller size: each pixel takes the nearest of the depths that fall into it, so that sparse depth stays.
+/// Depth at a smaller size: each pixel takes the smallest of the depths that fall into it, so that sparse depth is kept.
 #[must_use]
 pub fn shrink_depth(map: &DepthMap, (width, height): (u32, u32)) -> DepthMap {
     let (width, height) = (width as usize, height as usize);

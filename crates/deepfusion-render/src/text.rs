@@ -14,9 +14,9 @@ use image::{Rgb, RgbImage};
 pub enum TextSize {
     /// 6×10 pixels per letter.
     Small,
-    /// 7×13.
+    /// 7×13 pixels per letter.
     Medium,
-    /// 10×20.
+    /// 10×20 pixels per letter.
     Large,
 }
 

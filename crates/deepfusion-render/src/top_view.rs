@@ -5,7 +5,7 @@ use crate::html::escape;
 /// Paths seen from above, as a separate SVG file: one scale for both axes, and a scale bar.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TopView {
-    /// What it shows.
+    /// Title of the view.
     pub title: String,
     /// Names and points: metres to the right and ahead.
     pub paths: Vec<(String, Vec<[f64; 2]>)>,
@@ -14,7 +14,7 @@ pub struct TopView {
 const SIZE: f64 = 640.0;
 const MARGIN: f64 = 40.0;
 const TOP: f64 = 64.0;
-/// The first is the truth's: quiet, and drawn wide below the others.
+/// The first colour is that of the truth: muted, and drawn wide below the others.
 const COLOURS: [&str; 4] = ["#94a3b8", "#ea580c", "#2563eb", "#16a34a"];
 
 impl TopView {
@@ -47,11 +47,11 @@ impl TopView {
             })
         };
         let (x, y) = (span(0), span(1));
-        // A path on the spot has no extent of its own.
+        // A path without motion has no extent of its own.
         let extent = (x.1 - x.0).max(y.1 - y.0).max(1.0);
         let extent = if extent.is_finite() { extent } else { 1.0 };
         let scale = (SIZE - 2.0 * MARGIN) / extent;
-        // At 15 pixels a letter is 8 to 9 wide: a title of any usual length is seen whole.
+        // At 15 pixels a letter is 8 to 9 wide: a title of usual length fits.
         let title = 32.0 + 8.8 * self.title.chars().count() as f64;
         let width = ((x.1 - x.0).max(0.0) * scale + 2.0 * MARGIN).max(title.clamp(320.0, SIZE));
         let height = (y.1 - y.0).max(0.0) * scale + 2.0 * MARGIN + TOP;

@@ -12,7 +12,7 @@ use std::io::ErrorKind;
 use std::iter::Peekable;
 use std::path::{Path, PathBuf};
 
-/// Whether a path is a bag of ROS 2: an `.mcap` or `.db3` file, or a folder with the recorder's `metadata.yaml`.
+/// Whether a path is a ROS 2 bag: an `.mcap` or `.db3` file, or a folder with the recorder's `metadata.yaml`.
 #[must_use]
 pub fn is_ros2_bag(path: &Path) -> bool {
     if path.is_dir() {
@@ -22,7 +22,7 @@ pub fn is_ros2_bag(path: &Path) -> bool {
     }
 }
 
-/// A bag of ROS 2, open for reading.
+/// A ROS 2 bag, open for reading.
 ///
 /// ```no_run
 /// use deepfusion_ros2bag::Ros2Bag;
@@ -41,18 +41,18 @@ pub fn is_ros2_bag(path: &Path) -> bool {
 pub struct Ros2Bag {
     path: PathBuf,
     files: Vec<Box<dyn Storage>>,
-    /// Of every file's channels, in their order.
+    /// The channels of all files, in order.
     connections: Vec<Connection>,
     /// Files that `metadata.yaml` names but that do not exist.
     missing: Vec<PathBuf>,
 }
 
-/// The kind of a file, by its name.
+/// The kind of a file, from its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Mcap,
     Sqlite,
-    /// Compressed as a whole.
+    /// A file compressed as a whole.
     Packed,
 }
 
@@ -71,13 +71,13 @@ impl Kind {
 }
 
 impl Ros2Bag {
-    /// Opens a recording's folder, or one file of it. An MCAP file without a summary (its recorder was stopped) and a
-    /// damaged one are scanned from the front to the break; a database that was cut off is read as far as it goes.
+    /// Opens a recording's folder, or one file of it. An MCAP file that is damaged or has no summary (its recorder was stopped) is
+    /// scanned from the front to the damage. The readable part of a truncated database is read.
     /// [`MessageSource::damage`] reports either.
     ///
     /// MCAP files are mapped: they must not be shortened while the bag is open.
     ///
-    /// # Errors
+    /// [`Error::File`]; [`Error::Storage`] for files of another kind, files that are compressed as
     /// [`Error::File`]; [`Error::Storage`] for files of another kind, ones that are compressed as
     /// a whole, and a `metadata.yaml` that cannot be read; [`Error::Feature`] for SQLite without the feature `ros2-sqlite`.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
@@ -106,7 +106,7 @@ impl Ros2Bag {
         self.files.iter().flat_map(|file| file.channels())
     }
 
-    /// Every file's connections, one for each topic and publisher.
+    /// The connections of all files, one for each topic and publisher.
     pub fn connections(&self) -> impl Iterator<Item = &Connection> {
         self.connections.iter()
     }
@@ -200,7 +200,7 @@ struct Waiting<'a> {
     wanted: Vec<bool>,
 }
 
-/// The messages of several files in time order. A file that begins later is not touched before its time.
+/// The messages of several files in time order. A file that begins later is not read before its time.
 struct InOrder<'a> {
     selection: Selection,
     waiting: VecDeque<Waiting<'a>>,
@@ -235,10 +235,10 @@ impl<'a> Iterator for InOrder<'a> {
     }
 }
 
-/// What of a bag of ROS 2 cannot be read: what the [`SourceDamage`] of such a bag holds.
+/// The damage of a ROS 2 bag: the content of its [`SourceDamage`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BagDamage {
-    /// Its files that cannot be read, or not all of them; at least one.
+    /// The files that cannot be read, or not in full; at least one.
     pub files: Vec<FileDamage>,
 }
 
@@ -251,14 +251,14 @@ impl fmt::Display for BagDamage {
 
 impl std::error::Error for BagDamage {}
 
-/// What of a bag's file cannot be read.
+/// The damage of one of a bag's files.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileDamage {
-    /// Not all of it: what its reader found, a [`McapDamage`](crate::McapDamage) or, with the feature `ros2-sqlite`, a `DatabaseDamage`.
+    /// Only a part can be read: a [`McapDamage`](crate::McapDamage) or, with the feature `ros2-sqlite`, a `DatabaseDamage`.
     #[error(transparent)]
     Unreadable(SourceDamage),
-    /// `metadata.yaml` names it, and it is not there.
-    #[error("{} is not there", .0.display())]
+    /// `metadata.yaml` names the file, but it does not exist.
+    #[error("{} does not exist", .0.display())]
     NotThere(PathBuf),
 }

@@ -1,12 +1,12 @@
-//! Reads bags of ROS 2 into the messages of `deepfusion-rosbag`.
+//! Reads ROS 2 bags into the messages of `deepfusion-rosbag`.
 //!
 //! [`Ros2Bag::open`] takes a recording's folder (`metadata.yaml` and its files) or one of its files: MCAP or SQLite. It is
 //! a [`MessageSource`](deepfusion_rosbag::MessageSource): messages by topic and time, in time order, decoded as
-//! `deepfusion_rosbag::msg`'s types by name. ROS 2 has no MD5 of a type; a different definition is noticed by the
+//! `deepfusion_rosbag::msg`'s types by name. ROS 2 has no MD5 of a type; a different definition is detected by the
 //! message's length.
 //!
 //! The path of a message: `metadata` (which files) → `storage` (what MCAP and SQLite have in common): `mcap` (`record`
-//! → `index`, or `scan` where there is none → `chunk` → `messages`) or `sqlite` → `bag` (all files in time order) →
+//! → `index`, or `scan` if there is none → `chunk` → `messages`) or `sqlite` → `bag` (all files in time order) →
 //! [`Message`](deepfusion_rosbag::Message), whose bytes are CDR.
 //!
 //! A separate crate, because it brings C code (Zstandard, and with the feature `ros2-sqlite` SQLite) that a reader of ROS 1 does not

@@ -1,4 +1,4 @@
-//! `metadata.yaml`: the list of files in a recording's folder. Their content is described by the files themselves.
+//! `metadata.yaml`: the list of files in a recording's folder. The files themselves describe their content.
 
 use crate::problem::{KEY, StorageProblem};
 use deepfusion_rosbag::{Error, Result};
@@ -27,7 +27,7 @@ pub(crate) fn is_bag(folder: &Path) -> bool {
 /// The recording's files, in order of time.
 ///
 /// # Errors
-/// [`Error::File`]; [`Error::Storage`] where it is no such file.
+/// [`Error::File`]; [`Error::Storage`] if it is not such a file.
 pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let path = folder.join(NAME);
     let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
@@ -37,7 +37,7 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files.iter().map(|file| place(folder, file)).collect())
 }
 
-/// Old recorders put the folder's own name in front.
+/// Old recorders put the folder's own name before the file's.
 fn place(folder: &Path, file: &str) -> PathBuf {
     let path = folder.join(file);
     match (path.is_file(), Path::new(file).file_name()) {

@@ -1,4 +1,4 @@
-//! Messages that were compressed one by one (`ros2 bag record --compression-mode message`), whatever the storage.
+//! Messages that were compressed one by one (`ros2 bag record --compression-mode message`), in either storage.
 
 use crate::storage::MOST_BYTES;
 use std::io::{self, Read};
@@ -6,27 +6,27 @@ use std::io::{self, Read};
 /// The first bytes of a Zstandard frame, with which a CDR message never begins.
 const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
-/// Why a message that was compressed by itself cannot be unpacked.
+/// Why a separately compressed message cannot be decompressed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PackedProblem {
-    /// It is larger than a message may be.
-    #[error("{MOST_BYTES} bytes or more unpacked")]
+    /// The message is larger than allowed.
+    #[error("{MOST_BYTES} bytes or more decompressed")]
     TooLarge,
-    /// No decoder can be set up.
+    /// The decoder cannot be set up.
     #[error("{0}")]
     Decoder(#[source] io::Error),
-    /// Its bytes are damaged.
-    #[error("cannot be unpacked: {0}")]
+    /// The compressed bytes are damaged.
+    #[error("cannot be decompressed: {0}")]
     Unpack(#[source] io::Error),
 }
 
-/// Whether a message of CDR is compressed.
+/// Whether a CDR message is compressed.
 pub(crate) fn is_packed(bytes: &[u8]) -> bool {
     bytes.starts_with(&ZSTD)
 }
 
-/// The message itself.
+/// Decompresses a message.
 pub(crate) fn unpack(bytes: &[u8]) -> Result<Vec<u8>, PackedProblem> {
     let mut message = Vec::new();
     let decoder =

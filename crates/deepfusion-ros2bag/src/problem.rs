@@ -13,18 +13,18 @@ use std::path::Path;
 /// The only key of `metadata.yaml` that is read.
 pub(crate) const KEY: &str = "rosbag2_bagfile_information";
 
-/// Why a file of a ROS 2 bag cannot be read, or not all of it: what [`Error::Storage`] of such a bag holds.
+/// Why a file of a ROS 2 bag, or a part of it, cannot be read: the content of an [`Error::Storage`] of such a bag.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StorageProblem {
     /// The file is compressed as a whole.
-    #[error("the whole file is compressed (zstd), so that nothing in it can be found")]
+    #[error("the whole file is compressed (zstd) and cannot be searched")]
     Packed,
-    /// Its name has the ending of no kind that is read.
-    #[error("neither .mcap nor .db3")]
+    /// The name of the file has an unknown ending.
+    #[error("the name ends in neither .mcap nor .db3")]
     Ending,
-    /// It does not begin as an MCAP file.
-    #[error("not an MCAP file: it does not begin as one")]
+    /// The file does not begin as an MCAP file.
+    #[error("not an MCAP file: it does not begin with the format's magic bytes")]
     NotMcap,
     /// `metadata.yaml` does not name the recording's files.
     #[error("{KEY}: {}", first_line(.0))]
@@ -32,46 +32,46 @@ pub enum StorageProblem {
     /// A chunk of an MCAP file cannot be read.
     #[error("the chunk at byte {at}: {problem}")]
     Chunk {
-        /// Where it begins in the file.
+        /// Position of the chunk in the file.
         at: usize,
-        /// What is wrong with it.
+        /// What is wrong with the chunk.
         problem: ChunkProblem,
     },
-    /// A message of an MCAP file that was compressed by itself cannot be unpacked.
-    #[error("{topic}, a message of {time}: {problem}")]
+    /// A separately compressed message of an MCAP file cannot be decompressed.
+    #[error("{topic}, message at {time}: {problem}")]
     PackedMessage {
-        /// Its topic.
+        /// Topic of the message.
         topic: String,
-        /// When it was recorded.
+        /// Time at which the message was recorded.
         time: Time,
-        /// What is wrong with it.
+        /// What is wrong with the message.
         problem: PackedProblem,
     },
     /// SQLite cannot read the database.
     #[cfg(feature = "ros2-sqlite")]
     #[error("{}", sqlite::said(.0))]
     Sqlite(#[source] rusqlite::Error),
-    /// A message of a database cannot be unpacked.
+    /// A message of a database cannot be decompressed.
     #[cfg(feature = "ros2-sqlite")]
     #[error("{topic}, row {row}: {problem}")]
     Message {
-        /// Its topic.
+        /// Topic of the message.
         topic: String,
-        /// Its row of the table `messages`.
+        /// Row of the message in the table `messages`.
         row: i64,
-        /// What is wrong with it.
+        /// What is wrong with the message.
         problem: PackedProblem,
     },
 }
 
-/// The parser's other lines show the text about the place.
+/// The first line of a parser's message; the other lines show the text around the error.
 fn first_line(e: &serde_saphyr::Error) -> String {
     let text = e.to_string();
     text.lines().next().unwrap_or_default().to_owned()
 }
 
 impl StorageProblem {
-    /// The error of a file.
+    /// Makes it an error about a file.
     pub(crate) fn of(self, path: &Path) -> Error {
         Error::Storage {
             path: path.to_owned(),
@@ -84,11 +84,11 @@ impl Hint for StorageProblem {
     fn hint(&self) -> Option<String> {
         let text = match self {
             Self::Packed => {
-                "unpack it first: zstd -d FILE; `ros2 bag record --compression-mode message` keeps files open to reading"
+                "decompress it first with `zstd -d FILE`; record with `ros2 bag record --compression-mode message`, whose files can be read"
             }
             Self::Ending => "give the recording's folder, or one of its .mcap or .db3 files",
             Self::NotMcap => "give the recording's own .mcap file",
-            Self::Metadata(_) => "`ros2 bag reindex FOLDER` writes it anew",
+            Self::Metadata(_) => "write it again with `ros2 bag reindex FOLDER`",
             Self::Chunk { .. } => COPY_AGAIN,
             Self::PackedMessage { .. } => "the message is damaged",
             #[cfg(feature = "ros2-sqlite")]

@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-/// What is wrong with a database that is read as far as it goes.
+/// What is wrong with a database of which only a part can be read.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error(
     "the database is damaged ({reason}); {} {} found",
@@ -21,9 +21,9 @@ use std::sync::{Arc, Mutex};
     if *messages == 1 { "was" } else { "were" }
 )]
 pub struct DatabaseDamage {
-    /// What SQLite said.
+    /// SQLite's message.
     pub reason: Arc<rusqlite::Error>,
-    /// How many messages were found all the same.
+    /// Number of messages that were found nevertheless.
     pub messages: usize,
 }
 
@@ -33,15 +33,15 @@ pub(crate) struct SqliteFile {
     /// One reader at a time: a connection cannot be shared.
     database: Mutex<Connection>,
     channels: Vec<Channel>,
-    /// From a topic's number to its place in `channels`.
+    /// Maps a topic's number to its index in `channels`.
     places: HashMap<i64, usize>,
-    /// Every message in time order, if the database cannot order them itself: its index is missing, or it is damaged.
+    /// All messages in time order, if the database cannot order them itself: its index is missing, or it is damaged.
     listed: Option<Vec<Key>>,
     damage: Option<Arc<rusqlite::Error>>,
 }
 
 impl SqliteFile {
-    /// Opens a database; one that was cut off is read as far as it goes.
+    /// Opens a database; the readable part of a truncated one is read.
     ///
     /// # Errors
     /// [`Error::Storage`] for a file that is not a recorder's database.
@@ -75,7 +75,7 @@ impl SqliteFile {
     }
 
     fn database(&self) -> std::sync::MutexGuard<'_, Connection> {
-        // A reader that panicked has changed nothing.
+        // A reader that panicked has not changed anything.
         self.database
             .lock()
             .unwrap_or_else(|poisoned| poisoned.into_inner())
@@ -156,14 +156,14 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
     let database = if beside("-wal") || beside("-journal") {
         Connection::open_with_flags(path, flags)?
     } else {
-        // Nobody writes to it: no locks are needed, which a read-only disk could not hold.
+        // No other process writes to it, so locks, which fail on a read-only disk, are not needed.
         match uri(path) {
             Some(uri) => Connection::open_with_flags(uri, flags | OpenFlags::SQLITE_OPEN_URI)?,
             None => Connection::open_with_flags(path, flags)?,
         }
     };
     database.set_limit(Limit::SQLITE_LIMIT_LENGTH, MOST_BYTES as i32)?;
-    // A file from elsewhere must not bring code of its own: views, triggers.
+    // A file from an untrusted source must not run code of its own: views, triggers.
     database.execute_batch("PRAGMA trusted_schema = OFF; PRAGMA query_only = ON")?;
     Ok(database)
 }

@@ -6,28 +6,28 @@ use deepfusion_rosbag::{
 };
 use std::fmt;
 
-/// The largest chunk or message that is read, in bytes: what a damaged or hostile file can make one take.
+/// The largest chunk or message that is read, in bytes. It limits the memory that a damaged or hostile file can claim.
 pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
-/// The hint for damage typical of an incomplete copy.
-pub(crate) const COPY_AGAIN: &str = "copy the file again; what can be read of it is";
+/// The hint for damage that is typical of an incomplete copy.
+pub(crate) const COPY_AGAIN: &str = "copy the file again; the readable part is read";
 
 /// A file of a bag.
 pub(crate) trait Storage: fmt::Debug + Send + Sync {
-    /// Its topics, one connection each publisher.
+    /// Its topics, one connection per publisher.
     fn channels(&self) -> &[Channel];
 
     /// The times of the first and the last message.
     fn range(&self) -> Option<(Time, Time)>;
 
-    /// What of it cannot be read.
+    /// What cannot be read of it.
     fn damage(&self) -> Option<SourceDamage>;
 
-    /// The messages of the channels that are `wanted`, by place, in time order.
+    /// The messages of the channels that are `wanted`, by index, in time order.
     fn messages<'a>(&'a self, wanted: Vec<bool>, selection: &Selection) -> MessageIter<'a>;
 }
 
-/// A connection, how its messages are written, and when.
+/// A connection, the serialisation of its messages, and their times.
 #[derive(Debug, Clone)]
 pub(crate) struct Channel {
     pub connection: Connection,
@@ -50,7 +50,7 @@ impl Channel {
         let (serialization, type_name) = match encoding {
             "cdr" => (Serialization::Cdr, name),
             "ros1" => (Serialization::Ros1, name),
-            // No type that anybody asks for: messages of other middleware are listed, and not read.
+            // A type that no one requests: messages of other middleware are listed but not read.
             other => (Serialization::Cdr, format!("{name} ({other})")),
         };
         Self {
@@ -76,7 +76,7 @@ impl Channel {
     }
 }
 
-/// Channels gathered by topic, in order of names.
+/// Channels grouped by topic, in order of names.
 pub(crate) fn topics<'a>(channels: impl Iterator<Item = &'a Channel>) -> Vec<TopicInfo> {
     TopicInfo::gather(channels.map(|channel| (&channel.connection, channel.range)))
 }

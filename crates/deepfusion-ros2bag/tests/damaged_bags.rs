@@ -1,4 +1,4 @@
-//! Bags that were cut off, hurt or never finished: what is whole is read, what is not is said.
+//! Bags that were cut off, damaged or never finished: undamaged parts are read, damage is reported.
 
 use crate::common::{reference, sha256};
 use deepfusion_hint::Hint;
@@ -9,7 +9,7 @@ use std::path::Path;
 
 type Read = (u64, String, String);
 
-/// Every message that can be read, and the errors between them.
+/// Every message that can be read, and the errors in between.
 fn read(bag: &Ros2Bag) -> (Vec<Read>, Vec<String>) {
     let (mut found, mut errors) = (Vec::new(), Vec::new());
     for message in bag.messages(Selection::all()).unwrap().take(10_000) {
@@ -18,7 +18,7 @@ fn read(bag: &Ros2Bag) -> (Vec<Read>, Vec<String>) {
             Err(e) => errors.push(e.to_string()),
         }
     }
-    // SQLite has no checksums: an index whose bytes changed gives another order, and nobody can tell.
+    // SQLite has no checksums: an index whose bytes changed gives another order, which cannot be detected.
     let mcap = bag.path().extension().is_some_and(|e| e == "mcap");
     assert!(!mcap || found.is_sorted_by_key(|m| m.0), "in time order");
     (found, errors)
@@ -59,7 +59,7 @@ fn a_file_that_was_cut_off_is_read_up_to_the_break() {
             assert!(found.iter().all(|m| all.contains(m)), "{name} at {cut}");
             assert!(
                 found.len() >= most,
-                "a later break loses nothing: {name} at {cut}"
+                "a later cut loses nothing: {name} at {cut}"
             );
             most = found.len();
         }
@@ -73,14 +73,14 @@ fn a_chunk_that_is_hurt_costs_its_own_messages() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["none.mcap", "lz4.mcap", "zstd.mcap"] {
         let mut bytes = std::fs::read(reference(name)).unwrap();
-        // Within the first chunk, whose head is 9 + 40 bytes and a name, in a message's own bytes.
+        // Within the first chunk, whose header is 9 + 40 bytes and a name, in a message's own bytes.
         let chunk = bytes
             .windows(9)
             .position(|w| w[0] == 6 && w[3..9] == [0; 6])
             .unwrap();
         bytes[chunk + 900] ^= 0x10;
         let bag = open(folder.path(), "hurt.mcap", &bytes).unwrap();
-        assert_eq!(bag.damage(), None, "the summary is sound");
+        assert_eq!(bag.damage(), None, "the summary is undamaged");
         let (found, errors) = read(&bag);
         assert_eq!(errors.len(), 1, "{name}: {errors:?}");
         assert!(errors[0].contains("the chunk at byte"), "{errors:?}");
@@ -127,7 +127,7 @@ fn a_database_that_was_cut_off_is_read_up_to_the_break() {
             }
             Err(e) => {
                 let text = e.to_string();
-                let known = ["damaged", "not an SQLite", "no recorder's"];
+                let known = ["damaged", "not an SQLite", "not a recorder's"];
                 assert!(known.iter().any(|k| text.contains(k)), "{cut}: {text}");
                 assert!(e.hint().is_some(), "{text}");
             }
@@ -189,7 +189,7 @@ fn what_is_not_read_says_what_to_do() {
     std::fs::write(bag.join("metadata.yaml"), metadata).unwrap();
     let error = Ros2Bag::open(&bag).unwrap_err().to_string();
     assert!(error.contains("bag_0.db3"), "{error}");
-    // The first file, as old recorders name it, with the folder in front; the second is lost.
+    // The first file, as old recorders name it, with the folder before it; the second is missing.
     std::fs::copy(reference("sqlite/sqlite.db3"), bag.join("bag_0.db3")).unwrap();
     let opened = Ros2Bag::open(&bag).unwrap();
     assert_eq!(read(&opened).0.len(), 48);
@@ -199,7 +199,7 @@ fn what_is_not_read_says_what_to_do() {
     };
     assert_eq!(files, &[FileDamage::NotThere(bag.join("bag_1.db3"))]);
     let said = damage.to_string();
-    assert!(said.ends_with("bag_1.db3 is not there"), "{said}");
+    assert!(said.ends_with("bag_1.db3 does not exist"), "{said}");
     std::fs::write(
         bag.join("metadata.yaml"),
         "rosbag2_bagfile_information: 3\n",

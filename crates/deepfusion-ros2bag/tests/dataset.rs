@@ -1,4 +1,4 @@
-//! A simulated drive as a bag of ROS 1 and, by `reference/drive_to_ros2.py`, as bags of ROS 2: the same data set.
+//! A simulated drive as a ROS 1 bag and, by `reference/drive_to_ros2.py`, as ROS 2 bags: the same data set.
 
 use deepfusion_data::{Dataset, DatasetKind, Error, GtKind, OpenOptions, Split};
 use deepfusion_ros2bag::Ros2Bag;

@@ -1,5 +1,5 @@
-//! Bags that PyPI's `rosbags` and `mcap` wrote, read to the values that `rosbags` reads
-//! (`reference/ros2_reference.py`); exactly.
+//! Bags that PyPI's `rosbags` and `mcap` wrote, read to exactly the values that `rosbags` reads
+//! (`reference/ros2_reference.py`).
 
 use crate::common::{lines, read_json, real_bags, reference, sha256};
 use deepfusion_ros2bag::{Ros2Bag, is_ros2_bag};
@@ -7,7 +7,7 @@ use deepfusion_rosbag::{Message, MessageSource, Selection, Serialization, Time};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// A folder of each kind, one of its files, and files alone.
+/// A folder of each kind, one of its files, and files without a folder.
 const SAME: [&str; 12] = [
     "sqlite",
     "sqlite/sqlite.db3",
@@ -37,7 +37,7 @@ struct Expected {
     values: Vec<String>,
 }
 
-/// ROS 2 has no sequence numbers: they are 0 here, and not there at all in `rosbags`.
+/// ROS 2 has no sequence numbers: they are 0 here, and missing in `rosbags`.
 fn values(message: &Message<'_>) -> Vec<String> {
     let mut lines = lines(message);
     lines.retain(|line| line != "header.seq = 0");
@@ -101,7 +101,7 @@ fn selections_hold_the_messages_of_their_topics_and_times() {
             (&topics[..], first, u64::MAX),
             (&topics[..1], middle, last),
             (&topics[1..], first + 1, middle),
-            // One message, as a picture is read when it is asked for.
+            // A single message, as when one picture is requested.
             (&topics[..1], middle, middle + 1),
         ] {
             let selection = Selection::topics(topics.iter().copied())

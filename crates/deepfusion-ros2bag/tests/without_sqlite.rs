@@ -1,4 +1,4 @@
-//! What a build without SQLite reads, and what it says of a bag that it does not.
+//! What a build without SQLite reads, and its error for a bag that needs SQLite.
 
 #![cfg(not(feature = "ros2-sqlite"))]
 

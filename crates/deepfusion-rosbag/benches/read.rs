@@ -1,4 +1,4 @@
-//! Opening a bag and decoding every message of it: `cargo bench -p deepfusion-rosbag`. The same beside PyPI's `rosbags`,
+//! Opening a bag and decoding all its messages: `cargo bench -p deepfusion-rosbag`. The same compared with PyPI's `rosbags`,
 //! with the ratios: `python benches/peers/rosbags_read.py`.
 
 #![allow(

@@ -1,4 +1,4 @@
-//! What `benches/peers/rosbags_read.py` runs beside PyPI's `rosbags`.
+//! The program that `benches/peers/rosbags_read.py` compares with PyPI's `rosbags`.
 //!
 //! `throughput write FOLDER` writes the bags of the bench; `throughput read BAG` opens one, decodes every message and
 //! prints the seconds that took, the number of messages and their bytes.

@@ -13,9 +13,9 @@ type Outcome = Result<ReadableChunk, Fault>;
 
 /// A chunk that is being opened, or will be.
 pub(crate) enum Ticket {
-    /// By a thread, which sends it here.
+    /// Opened by a thread, which sends it here.
     Ahead(Receiver<Outcome>),
-    /// When it is asked for.
+    /// Opened on demand.
     OnDemand,
 }
 
@@ -24,8 +24,8 @@ struct Job {
     done: Sender<Outcome>,
 }
 
-/// The threads. They are the iterator's own, not a shared pool's: it waits for them, and a pool whose threads all wait
-/// for its own work stands still.
+/// The threads. They are the iterator's own, not a shared pool's: the iterator waits for them, and a pool whose threads all wait
+/// for the pool's own work would deadlock.
 pub(crate) struct Ahead {
     source: Arc<Source>,
     limit: usize,
@@ -42,7 +42,7 @@ impl Ahead {
             source,
             limit,
             threads,
-            // As many as are open at once in a bag whose chunks follow one another.
+            // As many chunks as are open at once in a bag whose chunks do not overlap in time.
             pool: Pool::new(2 * threads + 2),
             queue: None,
             workers: Vec::new(),
@@ -66,7 +66,7 @@ impl Ahead {
                 .collect();
             (jobs, queue)
         });
-        // Where the system has no thread to give, chunks are opened on demand.
+        // If the system cannot start a thread, chunks are opened on demand.
         if self.workers.is_empty() || jobs.send(job).is_err() {
             Ticket::OnDemand
         } else {
@@ -93,7 +93,7 @@ fn worker(
     let (source, queue, pool) = (Arc::clone(source), queue.clone(), Arc::clone(pool));
     let work = move || {
         for job in queue {
-            // Nobody waits any more where the iterator was dropped.
+            // If the iterator was dropped, no one receives the chunk.
             let _ = job
                 .done
                 .send(content::open(&source, &job.info, limit, &pool));

@@ -77,8 +77,8 @@ impl Bag {
     /// Opens a bag by its index, without touching its chunks. A bag whose index is missing or damaged is scanned from
     /// the front to the break, and [`Bag::damage`] reports it.
     ///
-    /// The file is mapped: it must not be shortened while the bag is open (the system then ends the process). A bag
-    /// that is still being recorded can be opened; what was appended later is not seen.
+    /// The file is mapped. It must not be shortened while the bag is open: the system then ends the process. A bag
+    /// that is still being recorded can be opened; messages appended later are not read.
     ///
     /// # Errors
     /// [`Error::File`], [`Error::NotABag`], [`Error::Version`], [`Error::Encrypted`].
@@ -231,7 +231,7 @@ fn after_magic(source: &Source) -> Result<usize> {
     })
 }
 
-/// The index of a bag by scanning it, and why that was needed. `wrong` is what was wrong with its own index.
+/// The index of a bag found by scanning it, and why that was needed. `wrong` is what was wrong with its own index.
 fn rescue(
     source: &Source,
     header: std::result::Result<&BagHeader, &Fault>,
@@ -239,7 +239,7 @@ fn rescue(
     options: BagOptions,
 ) -> (Index, Option<Damage>) {
     let Ok(header) = header else {
-        // Without a bag header nothing says where records begin.
+        // Without a bag header the start of the records is unknown.
         let fault = header.err().cloned();
         let damage = fault.map(|fault| Damage {
             offset: fault.offset,

@@ -13,7 +13,7 @@ use std::path::Path;
 pub struct BagSet {
     bags: Vec<Bag>,
     connections: Vec<Connection>,
-    /// For each bag, from a connection's index in it to the index in `connections`.
+    /// For each bag, maps a connection's index in the bag to its index in `connections`.
     places: Vec<Vec<u32>>,
 }
 
@@ -113,7 +113,7 @@ impl BagSet {
         Ok(topics)
     }
 
-    /// The messages that `selection` asks for, in time order over all bags; of equal times, in the bags' order. A bag
+    /// The messages that `selection` asks for, in time order over all bags; with equal times, in the bags' order. A bag
     /// that begins later is not touched before its time.
     ///
     /// # Errors
@@ -152,7 +152,7 @@ impl BagSet {
 /// times overlap.
 pub struct SetMessages<'set> {
     set: &'set BagSet,
-    /// Bags not begun, by their first message.
+    /// Bags not read yet, by their first message.
     waiting: VecDeque<BagMessages<'set>>,
     active: Vec<BagMessages<'set>>,
 }
@@ -168,7 +168,7 @@ impl<'set> Iterator for SetMessages<'set> {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            // A bag that is through gives back its threads.
+            // The threads of a bag that is finished end here.
             self.active
                 .retain_mut(|bag_messages| bag_messages.messages.next_time().is_some());
             let time = |bag_messages: &mut BagMessages<'set>| {
@@ -200,7 +200,7 @@ impl<'set> SetMessages<'set> {
     fn merged(&self, message: Message<'set>, bag: usize) -> Message<'set> {
         let set = self.set;
         let own = set.bags[bag].connections();
-        // A connection is an element of its bag's list: its place there is known by where it lies.
+        // A connection is an element of its bag's list, so its address gives its index.
         let place = own.iter().position(|c| std::ptr::eq(c, message.connection));
         let connection = place.map(|place| &set.connections[set.places[bag][place] as usize]);
         Message {

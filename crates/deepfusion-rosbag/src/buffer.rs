@@ -3,10 +3,10 @@
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};
 
-/// Buffers that nobody uses at the moment.
+/// Buffers that are not in use.
 pub(crate) struct Pool {
     free: Mutex<Vec<Vec<u8>>>,
-    /// How many of them are kept.
+    /// Most buffers that are kept.
     most: usize,
 }
 
@@ -33,7 +33,7 @@ impl Pool {
     }
 }
 
-/// A buffer that goes back to its pool. Behind what is filled it keeps bytes of its last use, so that it need not be
+/// A buffer that returns to its pool. After its valid bytes it keeps those of its last use, so that it need not be
 /// zeroed again.
 pub(crate) struct Buffer {
     bytes: Vec<u8>,
@@ -42,7 +42,7 @@ pub(crate) struct Buffer {
 }
 
 impl Buffer {
-    /// What is filled, and `room` bytes of no meaning behind it.
+    /// The valid bytes, and `room` arbitrary bytes after them.
     pub(crate) fn split(&mut self, room: usize) -> (&[u8], &mut [u8]) {
         let needed = self.filled + room;
         if self.bytes.len() < needed {
@@ -52,7 +52,7 @@ impl Buffer {
         (filled, &mut rest[..room])
     }
 
-    /// Counts bytes that were written behind what was filled.
+    /// Counts bytes that were written after the valid ones as valid.
     pub(crate) fn advance(&mut self, count: usize) {
         self.filled = (self.filled + count).min(self.bytes.len());
     }

@@ -6,13 +6,13 @@ use crate::op;
 use crate::problem::{ChunkProblem, Fault};
 use crate::record::Record;
 
-/// A chunk as it lies in the file.
+/// A chunk as it is stored in the file.
 pub(crate) struct Chunk<'a> {
     pub compression: Compression,
-    /// How many bytes it has decompressed, as its header says.
+    /// Its decompressed size in bytes, as its header says.
     pub size: usize,
     pub stored: &'a [u8],
-    /// Where the records after it begin.
+    /// Position of the records after it.
     pub end: usize,
 }
 
@@ -21,8 +21,8 @@ impl<'a> Chunk<'a> {
         Self::from_record(&Record::read(bytes, place(position))?)
     }
 
-    /// Up to a break: `stored` is what there is of it, and all that is left where the recorder wrote its header but
-    /// never came back to fill in the length.
+    /// Reads a chunk that may be cut off: `stored` is the part that exists. It is all the rest if the recorder wrote the header but
+    /// was stopped before filling in the length.
     pub(crate) fn read_to_break(bytes: &'a [u8], position: u64) -> Result<Self, Fault> {
         let record = Record::read_header(bytes, place(position))?;
         let mut chunk = Self::from_record(&record)?;
@@ -49,8 +49,8 @@ impl<'a> Chunk<'a> {
         })
     }
 
-    /// The bytes of a compressed chunk. Memory grows with what comes out, never beyond `limit` or the size that the
-    /// header promises; what came out before an error is left in `out`.
+    /// The decompressed bytes. Memory grows with the output, never beyond `limit` or the size that the
+    /// header gives; output from before an error remains in `out`.
     pub(crate) fn decompress(&self, limit: usize, out: &mut Buffer) -> Result<(), ChunkProblem> {
         let stated = self.size;
         if stated != usize::MAX && stated > limit {
@@ -76,7 +76,7 @@ fn place(position: u64) -> usize {
     usize::try_from(position).unwrap_or(usize::MAX)
 }
 
-/// Whether a record that can stand after a chunk begins at `at`, so that the chunk before it is truly empty.
+/// Whether a record that may follow a chunk begins at `at`, so that the chunk before it is indeed empty.
 fn another_follows(bytes: &[u8], at: usize) -> bool {
     let next = Record::read_header(bytes, at)
         .ok()

@@ -12,12 +12,12 @@ use std::io::{self, Read, Write};
 /// The compression of a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Compression {
-    /// None: read without copying.
+    /// No compression: read without copying.
     #[default]
     None,
-    /// LZ4 frames: fast both ways.
+    /// LZ4 frames: fast to write and to read.
     Lz4,
-    /// bzip2: smaller still, slow both ways.
+    /// bzip2: smaller still, slow to write and to read.
     Bz2,
 }
 
@@ -38,8 +38,8 @@ impl Compression {
             .find(|c| c.name().as_bytes() == name)
     }
 
-    /// Appends what `stored` holds to `out`, up to `most` bytes: more is an error. Memory grows with what comes out, and
-    /// what came out before an error stays.
+    /// Appends the decompressed `stored` to `out`, up to `most` bytes: more is an error. Memory grows with the output, and
+    /// output from before an error remains.
     pub(crate) fn decompress(
         self,
         stored: &[u8],
@@ -54,12 +54,12 @@ impl Compression {
     }
 }
 
-/// A chunk's content as it is stored.
+/// Compresses a chunk's content.
 pub(crate) fn compress(compression: Compression, content: &[u8]) -> io::Result<Cow<'_, [u8]>> {
     match compression {
         Compression::None => Ok(content.into()),
         Compression::Lz4 => {
-            // What ROS's own decoder insists on: independent blocks, a checksum at the end, no size in front.
+            // ROS's own decoder requires independent blocks, a checksum at the end, and no size at the front.
             let frame = FrameInfo::new()
                 .block_mode(BlockMode::Independent)
                 .block_size(BlockSize::Max1MB)
@@ -84,7 +84,7 @@ fn extend(out: &mut Buffer, bytes: &[u8], most: usize) -> Result<(), DecompressP
     Ok(())
 }
 
-/// Whatever a decoder gives, a mebibyte at a time.
+/// Reads all that a decoder gives, one mebibyte at a time.
 fn read_all(
     mut decoder: impl Read,
     most: usize,
@@ -92,7 +92,7 @@ fn read_all(
 ) -> Result<(), DecompressProblem> {
     const STEP: usize = 1 << 20;
     loop {
-        // One byte more than promised is asked for, so that a longer stream is noticed.
+        // One byte more than expected is read, so that a longer stream is noticed.
         let room = STEP.min((most - out.len()).saturating_add(1));
         match decoder.read(out.split(room).1) {
             Ok(0) => return Ok(()),

@@ -23,7 +23,7 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// From a connection record: number and topic in its header, all else in its data, which is a header again.
+    /// Reads a connection record: number and topic are in its header, everything else is in its data, which is a header again.
     pub(crate) fn read(record: &Record<'_>) -> Result<Self, Fault> {
         let data = Record {
             fields: Fields(record.data),

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// A chunk's content.
 #[derive(Clone)]
 pub(crate) enum Content {
-    /// `from..to` of the file.
+    /// The range `from..to` of the file.
     Stored {
         from: usize,
         to: usize,
@@ -28,15 +28,15 @@ impl Content {
     }
 }
 
-/// A chunk made readable, and where its index data begins.
+/// A chunk made readable, and the position of its index data.
 pub(crate) struct ReadableChunk {
     pub content: Content,
     pub end: usize,
-    /// What is wrong with a chunk of a scanned bag, whose content goes up to that.
+    /// What is wrong with a chunk of a scanned bag, whose content ends there.
     pub broken: Option<Fault>,
 }
 
-/// Makes a chunk readable, in a buffer of `pool` where it is compressed. Chunks of a scanned bag are read as far as they go.
+/// Makes a chunk readable, in a buffer of `pool` if it is compressed. Chunks of a scanned bag are read up to their damage.
 pub(crate) fn open(
     source: &Source,
     info: &ChunkInfo,
@@ -84,7 +84,7 @@ pub(crate) fn open(
     })
 }
 
-/// Whether opening the chunk is work worth a thread.
+/// Whether opening the chunk takes enough work for a thread.
 pub(crate) fn is_compressed(source: &Source, info: &ChunkInfo) -> bool {
     let chunk = Chunk::read_to_break(source, info.position);
     chunk.is_ok_and(|chunk| chunk.compression != Compression::None)

@@ -3,7 +3,7 @@
 use crate::Time;
 use crate::op;
 
-/// The bag header takes 4 KiB with its padding, so that it can be written again with the index's place.
+/// The bag header takes 4 KiB with its padding, so that it can be rewritten with the position of the index.
 const BAG_HEADER_BYTES: usize = 4096;
 
 /// The version of chunk information and index data.

@@ -1,4 +1,4 @@
-//! The positions of a chunk's messages, from the index data behind it or by walking through its content.
+//! The positions of a chunk's messages, from the index data after it or by walking through its content.
 
 use crate::Time;
 use crate::connection::Connection;
@@ -12,14 +12,14 @@ use std::collections::HashMap;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Entry {
     pub time: Time,
-    /// Place in the list of connections.
+    /// Index in the list of connections.
     pub connection: u32,
-    /// Where its record begins in the chunk's content.
+    /// Position of its record in the chunk's content.
     pub offset: u32,
 }
 
-/// The messages of a chunk by the index data records from `at`, where the chunk ends. `wanted` says by place which
-/// connections; the others' entries are skipped unread.
+/// The messages of a chunk from the index data records at `at`, the end of the chunk. `wanted` selects connections by
+/// index; the entries of others are skipped unread.
 pub(crate) fn indexed(
     bytes: &[u8],
     mut at: usize,
@@ -71,14 +71,14 @@ fn stamp(entry: &[u8]) -> Time {
         .map_or(Time::ZERO, |time| record::time(*time))
 }
 
-/// What walking through a chunk's content finds.
+/// The result of walking through a chunk's content.
 #[derive(Default)]
 pub(crate) struct Walk {
-    /// Connections' records; chunks hold those that were first used in them.
+    /// The connection records in it; a chunk has those of connections that were first used in it.
     pub connections: Vec<Connection>,
     /// Connection number in the file, time and offset of each message up to the break.
     pub messages: Vec<(u32, Time, u32)>,
-    /// What ended it before the content's end.
+    /// What ended the walk before the content's end.
     pub broken: Option<Fault>,
 }
 
@@ -112,7 +112,7 @@ fn step(content: &[u8], at: usize, walk: &mut Walk) -> Result<usize, Fault> {
 }
 
 impl Walk {
-    /// The messages of known connections.
+    /// The messages whose connection is known.
     pub(crate) fn entries(&self, places: &HashMap<u32, u32>) -> Vec<Entry> {
         let known = |&(id, time, offset): &(u32, Time, u32)| {
             let connection = *places.get(&id)?;
@@ -126,10 +126,10 @@ impl Walk {
     }
 }
 
-/// The bytes of the message at `entry`, checked against it.
+/// The bytes of the message at `entry`, after checking that it matches the entry.
 pub(crate) fn message<'a>(content: &'a [u8], entry: &Entry, id: u32) -> Result<&'a [u8], Fault> {
     let mut record = Record::read(content, entry.offset as usize)?;
-    // Some recorders' offsets point to the connection's record in front of its first message.
+    // Some recorders' offsets point to the connection's record before its first message.
     while record.op() == Some(op::CONNECTION) {
         record = Record::read(content, record.end())?;
     }

@@ -4,25 +4,25 @@ use deepfusion_hint::{Hint, count_of};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// What can go wrong with a bag.
+/// Why a bag cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A file or folder could not be opened, read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The file is no bag.
+    /// The file is not a bag.
     #[error("{}: not a ROS bag: expected `#ROSBAG V2.0`, it begins with {found}", path.display())]
     NotABag {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Its first bytes, escaped.
         found: String,
     },
     /// The bag has another format version than 2.0.
-    #[error("{}: a bag of format {version}; format 2.0 is read", path.display())]
+    #[error("{}: bag format {version}, expected 2.0", path.display())]
     Version {
-        /// The bag.
+        /// Path of the bag.
         path: PathBuf,
         /// Its version, such as `1.2`.
         version: String,
@@ -30,108 +30,108 @@ pub enum Error {
     /// The bag's chunks are encrypted.
     #[error("{}: encrypted with {encryptor}", path.display())]
     Encrypted {
-        /// The bag.
+        /// Path of the bag.
         path: PathBuf,
-        /// The plugin that encrypted it.
+        /// Name of the plugin that encrypted it.
         encryptor: String,
     },
-    /// A record is not what the format says.
+    /// A record does not have the required form.
     #[error("{}: byte {offset}: {problem}", path.display())]
     Record {
-        /// The bag.
+        /// Path of the bag.
         path: PathBuf,
-        /// Where in the file.
+        /// Position in the file.
         offset: u64,
-        /// What is wrong there.
+        /// What is wrong with the record.
         problem: BagProblem,
     },
     /// A chunk's messages cannot be read; those of other chunks can.
     #[error("{}: chunk at byte {offset} ({}): {problem}", path.display(), count_of(*messages, "message"))]
     Chunk {
-        /// The bag.
+        /// Path of the bag.
         path: PathBuf,
-        /// Where the chunk begins.
+        /// Position of the chunk in the file.
         offset: u64,
-        /// How many messages the index says it holds, of all topics.
+        /// Number of messages in the chunk according to the index, of all topics.
         messages: u64,
-        /// What is wrong with it.
+        /// What is wrong with the chunk.
         problem: BagProblem,
     },
-    /// No connection has the topic asked for.
-    #[error("{}: no topic {topic}; there are {}", path.display(), list(topics))]
+    /// No connection has the requested topic.
+    #[error("{}: no topic {topic}; available: {}", path.display(), list(topics))]
     NoSuchTopic {
-        /// The bag, or the first of a set.
+        /// Path of the bag, or of the first one of a set.
         path: PathBuf,
-        /// The topic asked for.
+        /// The requested topic.
         topic: String,
-        /// The topics there are.
+        /// The existing topics.
         topics: Vec<String>,
     },
     /// A message was decoded as another type than its connection's.
     #[error("{}: {topic} holds {found}, expected {expected}", path.display())]
     WrongType {
-        /// The bag.
+        /// Path of the bag.
         path: PathBuf,
         /// The message's topic.
         topic: String,
-        /// The connection's type, with its MD5 where only that differs.
+        /// The connection's type, with its MD5 if only that differs.
         found: String,
-        /// The type asked for.
+        /// The requested type.
         expected: String,
     },
-    /// A message's bytes are not what its type says.
+    /// A message's bytes do not fit its type.
     #[error("{}: {topic} at {time}: {type_name}: {source}", path.display())]
     Message {
-        /// The bag.
+        /// Path of the bag.
         path: PathBuf,
         /// The message's topic.
         topic: String,
-        /// When it was recorded.
+        /// The time at which it was recorded.
         time: Time,
-        /// Its type.
+        /// The message's type.
         type_name: &'static str,
         /// The field and what is wrong with it.
         source: Box<MessageError>,
     },
     /// A message or a name does not fit into the format's 32-bit lengths.
-    #[error("{}: {what} of {bytes} bytes: the format holds up to {limit}", path.display())]
+    #[error("{}: {what} of {bytes} bytes: the format allows at most {limit}", path.display())]
     TooLarge {
-        /// The bag being written.
+        /// Path of the bag being written.
         path: PathBuf,
         /// What is too large, with its article.
         what: &'static str,
-        /// Its size.
+        /// Its size in bytes.
         bytes: u64,
-        /// The largest size there is.
+        /// The largest allowed size in bytes.
         limit: u64,
     },
-    /// A connection of another writer was used.
+    /// A connection that another writer returned was used.
     #[error("{}: connection {connection} was not added to this bag", path.display())]
     NoSuchConnection {
-        /// The bag being written.
+        /// Path of the bag being written.
         path: PathBuf,
         /// The connection's number.
         connection: u32,
     },
-    /// A recording of another format than ROS 1 bags cannot be read, or not all of it.
+    /// A recording in another format than ROS 1 bags cannot be read, or not all of it.
     #[error("{}: {problem}", path.display())]
     Storage {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it, as an error of the crate that reads this format.
+        /// The error of the crate that reads this format.
         problem: Box<dyn Hint + Send + Sync>,
     },
-    /// A recording of a kind whose reader is compiled in only with a feature, which is off.
+    /// The reader of this kind of recording is behind a feature that is off.
     #[error("{}: it is {kind}, and this program was built without the feature `{feature}`", path.display())]
     Feature {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What it is.
+        /// Kind of the recording.
         kind: &'static str,
         /// The feature, which has this name in every crate.
         feature: &'static str,
     },
-    /// A set of no bags.
+    /// The set has no bags.
     #[error("a set of bags needs at least one bag")]
     EmptySet,
 }
@@ -147,7 +147,7 @@ fn list(names: &[String]) -> String {
 }
 
 impl Error {
-    /// An error of the system's at `path`.
+    /// An error of the operating system about `path`.
     #[must_use]
     pub fn file(path: &Path, source: std::io::Error) -> Self {
         FileError::new(path, source).into()
@@ -164,25 +164,27 @@ impl Hint for Error {
             }
             Self::File(error) => return error.hint(),
             Self::NotABag { .. } => {
-                "a ROS 2 recording (.mcap, .db3) keeps its own ending; other files are no recordings of ROS"
+                "name ROS 2 recordings .mcap or .db3; other files are not ROS recordings"
             }
             Self::Version { .. } => {
-                "bags from before 2010: `rosbag fix` or `rosbag reindex` of ROS 1 writes them as 2.0"
+                "convert bags from before 2010 with `rosbag fix` or `rosbag reindex` of ROS 1"
             }
-            Self::Encrypted { .. } => "decrypt it first: rosbag decrypt",
+            Self::Encrypted { .. } => "decrypt it first, with `rosbag decrypt`",
             Self::Record { .. } => {
                 "the file is damaged: copy it again, or open it with `ignore_index` to scan it"
             }
             Self::Chunk { .. } => {
                 "copy the bag again; the messages of the other chunks can be read"
             }
-            Self::NoSuchTopic { .. } => "topics are matched whole, with their leading slash",
+            Self::NoSuchTopic { .. } => "give the topic's full name, with its leading slash",
             Self::WrongType { .. } => {
                 "choose the topic by its type, or read the message's raw bytes"
             }
             Self::Message { source, .. } => return source.hint(),
             Self::TooLarge { .. } => "split it over several messages",
-            Self::NoSuchConnection { .. } => "use what `add_connection` of this writer returned",
+            Self::NoSuchConnection { .. } => {
+                "use a connection that `add_connection` of this writer returned"
+            }
             Self::Storage { problem, .. } => return problem.hint(),
             Self::Feature { feature, .. } => {
                 return Some(format!("build with the feature `{feature}` to read it"));

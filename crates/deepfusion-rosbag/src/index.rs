@@ -1,4 +1,4 @@
-//! The index at the end of a finished bag: its connections, and of each chunk the time range and message counts.
+//! The index at the end of a finished bag: its connections, and each chunk's time range and message counts.
 
 use crate::connection::Connection;
 use crate::problem::{Fault, IndexProblem, IndexRecord};
@@ -13,7 +13,7 @@ pub(crate) struct BagHeader {
     pub connections: u32,
     pub chunks: u32,
     pub encryptor: Option<String>,
-    /// Where the records after it begin.
+    /// Position of the records after it.
     pub end: usize,
 }
 
@@ -31,16 +31,16 @@ impl BagHeader {
     }
 }
 
-/// What is known of a chunk before it is touched.
+/// What is known of a chunk before its data is read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ChunkInfo {
-    /// Where its record begins.
+    /// Position of its record.
     pub position: u64,
     pub first: Time,
     pub last: Time,
-    /// Place in the list of connections, number of messages.
+    /// Index in the list of connections, and number of messages.
     pub counts: Vec<(u32, u32)>,
-    /// Its messages are found by walking through it, up to a break if there is one: the bag has no index.
+    /// Whether its messages are found by walking through it, up to any damage: the bag has no index.
     pub scanned: bool,
 }
 
@@ -54,7 +54,7 @@ impl ChunkInfo {
 #[derive(Default)]
 pub(crate) struct Index {
     pub connections: Vec<Connection>,
-    /// From a connection's number in the file to its place in `connections`.
+    /// Maps a connection's number in the file to its index in `connections`.
     pub places: HashMap<u32, u32>,
     pub chunks: Vec<ChunkInfo>,
 }

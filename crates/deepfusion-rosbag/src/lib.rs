@@ -3,8 +3,8 @@
 //! [`Bag::open`] reads a bag's index; [`Bag::messages`] yields the messages of a [`Selection`] in time order, raw or
 //! decoded as one of [`msg`]'s types. [`BagSet`] reads several bags as one. [`BagWriter`] writes.
 //!
-//! The path of a message: `record` (a file's building block) → `index` (where chunks are; `scan` where there is none)
-//! → `chunk` and `content` (its bytes, decompressed `ahead`) → `entry` (where its messages are) → [`Messages`] (in
+//! The path of a message: `record` (a file's building block) → `index` (positions of the chunks; `scan` without an index)
+//! → `chunk` and `content` (its bytes, decompressed `ahead`) → `entry` (positions of its messages) → [`Messages`] (in
 //! time order) → [`Message`] → `msg`. The format: <http://wiki.ros.org/Bags/Format/2.0>.
 //!
 //! [`MessageSource`] is the common interface of recordings of any format; `deepfusion-ros2bag` reads those of ROS 2

@@ -8,15 +8,15 @@ use crate::problem::{DecompressProblem, FramePart};
 use lz4_flex::block::{decompress_into, decompress_into_with_dict};
 use twox_hash::XxHash32;
 
-/// What the steps of decompressing give back.
+/// Result of a step of decompression.
 type Result<T> = std::result::Result<T, DecompressProblem>;
 
 const MAGIC: u32 = 0x184d_2204;
-/// How far back a block may refer.
+/// How far back a block may refer, bytes.
 const WINDOW: usize = 1 << 16;
 
-/// Appends what the frames in `stored` hold to `out`, up to `most` bytes in all: more is an error. Memory grows with the
-/// blocks; those before an error stay in `out`.
+/// Appends the decompressed frames of `stored` to `out`, up to `most` bytes in all: more is an error. Memory grows with the
+/// blocks; those from before an error remain in `out`.
 pub(crate) fn decompress(stored: &[u8], most: usize, out: &mut Buffer) -> Result<()> {
     let mut rest = UnreadBytes(stored);
     while !rest.0.is_empty() {
@@ -77,7 +77,7 @@ impl Header {
         })
     }
 
-    /// The next block; none at the frame's end mark.
+    /// The next block; `None` at the frame's end mark.
     fn block<'a>(&self, rest: &mut UnreadBytes<'a>) -> Result<Option<Block<'a>>> {
         let length = rest.u32()?;
         if length == 0 {
@@ -101,7 +101,7 @@ impl Header {
             out.extend(block.bytes);
             return Ok(());
         }
-        // LZ4 makes at most 255 bytes of one.
+        // LZ4 expands one byte to at most 255.
         let (before, target) = out.split(room.min(block.bytes.len().saturating_mul(255)));
         let unpacked = if self.linked {
             let window = start.max(filled.saturating_sub(WINDOW));
@@ -168,7 +168,7 @@ mod tests {
     use lz4_flex::frame::{BlockMode, BlockSize, FrameEncoder, FrameInfo};
     use std::io::Write;
 
-    /// Four blocks and a bit, whose matches reach from each into the one before.
+    /// Four blocks and a bit, whose matches refer back into the block before.
     fn content() -> Vec<u8> {
         let tile: Vec<u8> = (0..999_u32).map(|i| ((i * i) >> 5) as u8).collect();
         tile.iter()

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// A recorded message: its connection, its time, and its bytes.
 ///
-/// It borrows the bag. Of a compressed chunk it keeps the whole decompressed chunk alive (768 KiB by default): keep
+/// It borrows the bag. If its chunk is compressed, it keeps the whole decompressed chunk alive (768 KiB by default): keep
 /// what you decode rather than many messages.
 #[derive(Clone)]
 pub struct Message<'bag> {
@@ -22,11 +22,11 @@ pub struct Message<'bag> {
 
 #[derive(Clone)]
 pub(crate) enum Payload<'bag> {
-    /// In the file itself.
+    /// In the file's mapping.
     Stored(&'bag [u8]),
     /// In a decompressed chunk.
     Unpacked(Arc<Buffer>, Range<usize>),
-    /// In memory that another reader holds.
+    /// In memory owned by another reader.
     Held(Arc<Vec<u8>>, Range<usize>),
 }
 
@@ -120,7 +120,7 @@ impl<'bag> Message<'bag> {
     }
 
     /// The header's time of measurement, without decoding the message, which must begin with a header; `None` if it is
-    /// not set, or the message is too short. [`CompressedVideo`] begins with a time alone, which is as good.
+    /// not set, or the message is too short. [`CompressedVideo`] begins with a time alone, which is used as well.
     #[must_use]
     pub fn header_stamp(&self) -> Option<Time> {
         let data = self.data();
@@ -134,7 +134,7 @@ impl<'bag> Message<'bag> {
         };
         let (at, big) = match self.serialization {
             Serialization::Ros1 if self.is_video() => (0, false),
-            // Behind the sequence number.
+            // After the sequence number.
             Serialization::Ros1 => (size_of::<u32>(), false),
             Serialization::Cdr => (CDR_HEADER, cdr_is_big_endian(data).ok()?),
         };
@@ -166,7 +166,7 @@ impl<'bag> Message<'bag> {
     /// Whether it is a `T`, by type name and MD5.
     #[must_use]
     pub fn is<'m, T: RosMessage<'m>>(&self) -> bool {
-        // `*` stands for any definition, in recordings of tools that did not know it.
+        // `*` stands for any definition, in recordings by tools that did not know it.
         let md5 = &self.connection.md5;
         self.connection.type_name == T::TYPE && (md5 == T::MD5 || md5 == "*")
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 /// Messages in time order, with errors for those that cannot be read.
 pub type MessageIter<'a> = Box<dyn Iterator<Item = Result<Message<'a>>> + 'a>;
 
-/// A recording of messages by topic and time, in any format: a [`Bag`], or a bag of ROS 2.
+/// A recording of messages by topic and time, in any format: a [`Bag`], or a ROS 2 bag.
 ///
 /// Several threads may read from it at once.
 pub trait MessageSource: fmt::Debug + Send + Sync {
@@ -20,13 +20,13 @@ pub trait MessageSource: fmt::Debug + Send + Sync {
     /// The topics by name, with type, count, time range and rate.
     ///
     /// # Errors
-    /// Where the index cannot be read.
+    /// If the index cannot be read.
     fn topics(&self) -> Result<Vec<TopicInfo>>;
 
     /// The times of the first and the last message; `None` without any.
     fn time_range(&self) -> Option<(Time, Time)>;
 
-    /// What is wrong with the recording, where not all of it can be read.
+    /// What is wrong with the recording, if not all of it can be read.
     fn damage(&self) -> Option<SourceDamage>;
 
     /// The messages that `selection` asks for, in time order, streaming: memory does not grow with the recording.

@@ -15,11 +15,11 @@ use std::sync::Arc;
 
 /// The messages of a [`Bag`] in a [`Selection`], in time order; with equal times, in the file's order.
 ///
-/// An error is about one chunk or one message; the iterator continues behind it, so that a caller may stop there
+/// An error is about one chunk or one message. The iterator continues after it, so that a caller may stop there
 /// (`?`) or count and continue.
 ///
-/// Memory: a chunk is decompressed shortly before its first message and released after its last. In memory at one
-/// time are the chunks whose times overlap, up to two per thread decompressed ahead, those that the caller's messages
+/// Memory: a chunk is decompressed shortly before its first message and released after its last. At any time, memory
+/// holds the chunks whose times overlap, up to two chunks per thread decompressed ahead, those that the caller's messages
 /// keep alive, and 16 bytes per message of each open chunk. The rest is the file's mapping, which the system can drop
 /// at any time.
 pub struct Messages<'bag> {
@@ -28,7 +28,7 @@ pub struct Messages<'bag> {
     selection: Selection,
     /// Chunks not open yet, by their first message's time.
     waiting: VecDeque<Waiting<'bag>>,
-    /// How many chunks at the front of `waiting` have been submitted, and how many may be: it grows from one, so that
+    /// How many chunks at the front of `waiting` have been submitted, and how many may be. The limit grows from one, so that
     /// a request for a single message does not decompress many chunks.
     submitted: usize,
     window: usize,
@@ -43,7 +43,7 @@ struct Waiting<'bag> {
     ticket: Ticket,
 }
 
-/// A chunk with messages left; ordered by the next of them, then by its place in the file.
+/// A chunk with messages left; ordered by the next of them, then by its position in the file.
 struct OpenChunk {
     next: (Time, u64),
     entries: std::vec::IntoIter<Entry>,
@@ -62,7 +62,7 @@ impl<'bag> Messages<'bag> {
         Ok(Self::of(bag, wanted, selection, 0))
     }
 
-    /// The messages of the connections `wanted`, by place.
+    /// The messages of the connections in `wanted`, by index.
     pub(crate) fn of(
         bag: &'bag Bag,
         wanted: Vec<bool>,
@@ -98,7 +98,7 @@ impl<'bag> Messages<'bag> {
         }
     }
 
-    /// The next message's time, opening what must be open to know it; [`Time::ZERO`] where an error comes first.
+    /// The next message's time, after opening all chunks that may have it; [`Time::ZERO`] if an error comes first.
     pub(crate) fn next_time(&mut self) -> Option<Time> {
         loop {
             if !self.errors.is_empty() {
@@ -127,7 +127,7 @@ impl<'bag> Messages<'bag> {
         self.window = (2 * self.window).min(2 * self.bag.options().threads.max(1));
     }
 
-    /// Keeps the threads busy with the chunks that come next.
+    /// Keeps the threads busy with the next chunks.
     fn submit(&mut self) {
         let until = self.window.min(self.waiting.len());
         for waiting in self.waiting.range_mut(self.submitted.min(until)..until) {
@@ -150,7 +150,7 @@ impl<'bag> Messages<'bag> {
         } else {
             entry::indexed(file, opened.end, info, places, wanted)?
         };
-        // A chunk that begins before the index says has come too late to keep the order.
+        // A chunk with an earlier message than the index says was opened too late to keep the order.
         if let Some(early) = entries.iter().find(|e| e.time < info.first) {
             let problem = IndexProblem::Early {
                 time: early.time,
@@ -232,7 +232,7 @@ fn read_message<'bag>(
     })
 }
 
-/// Where `part`, a slice of `whole`, lies in it.
+/// Range of `part`, a slice of `whole`, within it.
 fn range_within(whole: &[u8], part: &[u8]) -> Range<usize> {
     let from = part.as_ptr().addr() - whole.as_ptr().addr();
     from..from + part.len()

@@ -1,4 +1,4 @@
-//! What a record is, its field `op`.
+//! The kinds of records: values of their field `op`.
 
 pub(crate) const MESSAGE: u8 = 2;
 pub(crate) const BAG_HEADER: u8 = 3;
@@ -7,7 +7,7 @@ pub(crate) const CHUNK: u8 = 5;
 pub(crate) const CHUNK_INFO: u8 = 6;
 pub(crate) const CONNECTION: u8 = 7;
 
-/// What an operation stands for, where it is expected.
+/// Name of a kind of record, for messages about what was expected.
 pub(crate) fn name_of(op: u8) -> &'static str {
     match op {
         BAG_HEADER => "the bag header",

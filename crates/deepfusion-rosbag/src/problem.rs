@@ -1,4 +1,4 @@
-//! What is wrong with a place in a bag.
+//! What is wrong at a position in a bag.
 
 mod chunk;
 mod decompress;
@@ -10,38 +10,38 @@ pub use self::decompress::{DecompressProblem, FramePart};
 pub use self::index::{IndexProblem, IndexRecord};
 pub use self::record::{RecordPart, RecordProblem};
 
-/// What is wrong with a place in a bag.
+/// What is wrong at a position in a bag.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BagProblem {
-    /// A record is not what the format says.
+    /// A record does not have the required form.
     #[error(transparent)]
     Record(#[from] RecordProblem),
-    /// The index says something else than the bag.
+    /// The index contradicts the bag.
     #[error(transparent)]
     Index(#[from] IndexProblem),
     /// A chunk cannot be read.
     #[error(transparent)]
     Chunk(#[from] ChunkProblem),
-    /// It lies at another byte of the file than what it makes unreadable.
+    /// The fault lies at another byte of the file than the part that it makes unreadable.
     #[error("byte {byte}: {problem}")]
     At {
-        /// The byte of the file.
+        /// Position in the file.
         byte: u64,
-        /// What is wrong there.
+        /// What is wrong at this position.
         problem: Box<BagProblem>,
     },
-    /// It lies within a chunk's content.
+    /// The fault lies within a chunk's content.
     #[error("in the chunk, byte {byte}: {problem}")]
     InChunk {
-        /// The byte of the decompressed content.
+        /// Position in the decompressed content.
         byte: u64,
-        /// What is wrong there.
+        /// What is wrong at this position.
         problem: Box<BagProblem>,
     },
 }
 
-/// Something wrong at an offset, before the file's name is known.
+/// A problem at an offset, before the file's name is known.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Fault {
     pub offset: u64,
@@ -56,7 +56,7 @@ impl Fault {
         }
     }
 
-    /// The problem of what begins elsewhere in the file, with the fault's own place.
+    /// The same problem for something that begins elsewhere in the file; the fault's own position is kept.
     pub(crate) fn elsewhere(self) -> BagProblem {
         BagProblem::At {
             byte: self.offset,
@@ -64,7 +64,7 @@ impl Fault {
         }
     }
 
-    /// The problem of a chunk in whose content the fault was found.
+    /// The problem of a chunk whose content has the fault.
     pub(crate) fn within(self) -> BagProblem {
         BagProblem::InChunk {
             byte: self.offset,

@@ -4,13 +4,13 @@
 use crate::problem::{BagProblem, Fault, RecordPart, RecordProblem};
 use crate::{Time, op};
 
-/// A record as it lies in `bytes`; nothing is copied or allocated, whatever its lengths claim.
+/// A record as it is stored in `bytes`; nothing is copied or allocated, whatever its lengths claim.
 #[derive(Clone, Copy)]
 pub(crate) struct Record<'a> {
-    /// Where it begins.
+    /// Position of the record.
     pub at: usize,
     pub fields: Fields<'a>,
-    /// Where its data begins.
+    /// Position of its data.
     pub data_at: usize,
     /// The stated length of its data; [`Record::read`] has checked it, [`Record::read_header`] has not.
     pub data_len: usize,
@@ -18,7 +18,7 @@ pub(crate) struct Record<'a> {
 }
 
 impl<'a> Record<'a> {
-    /// The record at `at`, whole.
+    /// Reads the complete record at `at`.
     pub(crate) fn read(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
         let record = Self::read_header(bytes, at)?;
         if record.data.len() < record.data_len {
@@ -30,7 +30,7 @@ impl<'a> Record<'a> {
         Ok(record)
     }
 
-    /// The record at `at` with the part of its data that is there.
+    /// Reads the record at `at`, with the part of its data that exists.
     pub(crate) fn read_header(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
         let cut = |part| {
             let bytes = bytes.len();
@@ -56,7 +56,7 @@ impl<'a> Record<'a> {
         })
     }
 
-    /// Where the next record begins.
+    /// Position of the next record.
     pub(crate) fn end(&self) -> usize {
         self.data_at + self.data.len()
     }
@@ -131,7 +131,7 @@ impl<'a> Record<'a> {
     }
 }
 
-/// The fields of a header: an iterator over names and values that ends where the header stops making sense.
+/// The fields of a header: an iterator over names and values that ends at the first invalid field.
 #[derive(Clone, Copy)]
 pub(crate) struct Fields<'a>(pub &'a [u8]);
 
@@ -150,14 +150,14 @@ impl<'a> Iterator for Fields<'a> {
     fn next(&mut self) -> Option<Self::Item> {
         let (length, rest) = self.0.split_first_chunk()?;
         let (field, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
-        // A value may hold the separator, a name may not.
+        // A value may contain the separator, a name may not.
         let equals = field.iter().position(|&byte| byte == b'=')?;
         self.0 = rest;
         Some((&field[..equals], &field[equals + 1..]))
     }
 }
 
-/// The u32 at `at`, where there are four bytes.
+/// The u32 at `at`, if there are four bytes.
 pub(crate) fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
     let four = bytes.get(at..)?.first_chunk()?;
     Some(u32::from_le_bytes(*four))
@@ -208,7 +208,7 @@ mod tests {
             let mut bytes = sound.clone();
             bytes[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
             match Record::read(&bytes, 0) {
-                // A field that lies about its length ends the fields; the record's frame is still sound.
+                // A field with a wrong length ends the fields; the record around it can still be read.
                 Ok(record) => assert!(at == 4 && record.op().is_none()),
                 Err(fault) => assert!(fault.problem.to_string().contains(what), "{fault:?}"),
             }

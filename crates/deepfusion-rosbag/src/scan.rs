@@ -1,4 +1,4 @@
-//! A bag without a usable index: every record from the front to the break.
+//! A bag without a usable index: reads every record from the front to the first damage.
 
 use crate::Time;
 use crate::buffer::Pool;
@@ -18,16 +18,16 @@ use std::sync::Arc;
 /// The damage of a bag that was scanned instead of opened by its index.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Damage {
-    /// The byte of the file where its records end, or the first one that cannot be read.
+    /// The byte of the file where its records end, or the position of the first one that cannot be read.
     pub offset: u64,
     /// Why it was scanned.
     pub reason: ScanReason,
-    /// What is wrong at that byte; `None` where every record up to the end was read.
+    /// What is wrong at that byte; `None` if every record up to the end was read.
     pub problem: Option<BagProblem>,
     /// Number of chunks in the bag's header beyond those found; `None` if the recorder never wrote the count.
     pub chunks_lost: Option<u64>,
     /// Number of messages found that cannot be assigned, because the record of their connection is lost. Messages
-    /// that were never written, or lie behind the break, are not counted.
+    /// that were never written, or come after the damage, are not counted.
     pub messages_without_connection: u64,
 }
 
@@ -35,9 +35,9 @@ pub struct Damage {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ScanReason {
-    /// The index was to be ignored.
+    /// The caller asked to ignore the index.
     AskedFor,
-    /// Its header cannot be read, so that nothing says where records begin.
+    /// Its header cannot be read, so that the start of the records is unknown.
     BagHeader,
     /// Its index cannot be read.
     Index(BagProblem),
@@ -45,14 +45,16 @@ pub enum ScanReason {
     NoIndex,
 }
 
-/// What stands in front of the problem that ended the scan.
+/// Beginning of the message, before the problem that ended the scan.
 impl fmt::Display for ScanReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::AskedFor => Ok(()),
             Self::BagHeader => f.write_str("the bag header: "),
             Self::Index(problem) => write!(f, "the index cannot be read ({problem}): "),
-            Self::NoIndex => f.write_str("the recorder did not finish the bag, it has no index: "),
+            Self::NoIndex => {
+                f.write_str("the recorder did not finish the bag, which has no index: ")
+            }
         }
     }
 }
@@ -79,15 +81,15 @@ impl fmt::Display for Damage {
 
 impl std::error::Error for Damage {}
 
-/// The result of a scan: an index, and the first break.
+/// The result of a scan: an index, and the first damage.
 pub(crate) struct Scan {
     pub index: Index,
     pub broken: Option<Fault>,
     pub messages_without_connection: u64,
 }
 
-/// Reads every record from `start`. Chunks are decompressed on all threads, one each at a time; what stays is their
-/// time range and counts.
+/// Reads every record from `start`. Chunks are decompressed on all threads, one at a time on each; only their
+/// time ranges and counts are kept.
 pub(crate) fn scan(source: &Source, start: usize, limit: usize) -> Scan {
     let frames = Frames::find(source, start);
     let pool = Pool::new(rayon::current_num_threads());
@@ -97,7 +99,7 @@ pub(crate) fn scan(source: &Source, start: usize, limit: usize) -> Scan {
         .map(|position| ScannedChunk::read(source, position, limit, &pool))
         .collect();
     let mut index = Index::default();
-    // Definitions in the chunks first: that is the order in which the recorder met the topics.
+    // Definitions in the chunks come first: that is the order in which the recorder first saw the topics.
     for found in &chunks {
         found
             .connections
@@ -189,7 +191,7 @@ impl Frames {
     }
 }
 
-/// A chunk looked through; its counts are by connection number, as in the file.
+/// The result of scanning a chunk; its counts are by connection number, as in the file.
 struct ScannedChunk {
     info: ChunkInfo,
     connections: Vec<Connection>,
@@ -213,7 +215,7 @@ impl ScannedChunk {
                         offset: from as u64 + fault.offset,
                         ..fault
                     },
-                    // A byte of a compressed chunk's content is nowhere in the file: the chunk's own place stands.
+                    // A byte of a compressed chunk's content has no position in the file; the chunk's own is used.
                     Content::Unpacked(_) => Fault {
                         offset: position,
                         problem: fault.within(),

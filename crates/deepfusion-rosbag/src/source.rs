@@ -29,10 +29,10 @@ impl Source {
         if metadata.len() == 0 {
             return Ok(Self::memory(path, Vec::new()));
         }
-        // SAFETY: the mapping is read-only and private. What remains is memmap2's caveat, stated at `Bag::open`: nobody
-        // may shorten the file meanwhile (a recorder only appends).
+        // SAFETY: the mapping is read-only and private. What remains is memmap2's caveat, stated at `Bag::open`: the file
+        // must not be shortened meanwhile (a recorder only appends).
         let map = unsafe { Mmap::map(&file) }.map_err(failed)?;
-        // Chunks are read from front to back. Advice only: a system that refuses it reads as before.
+        // Chunks are read from front to back. This is advice only: a system that ignores it reads as before.
         #[cfg(unix)]
         let _ = map.advise(Advice::Sequential);
         Ok(Self {

@@ -1,21 +1,21 @@
-//! What of a recording cannot be read, whatever its format.
+//! The part of a recording that cannot be read, in any format.
 
 use std::error::Error;
 use std::fmt;
 use std::sync::Arc;
 
-/// What of a recording cannot be read, as its reader found it: [`Damage`](crate::Damage) of a bag of ROS 1, a type of its own crate of
-/// any other. Two are alike where they say the same.
+/// The damage that a reader found: [`Damage`](crate::Damage) for a ROS 1 bag, a type of its own crate for
+/// any other format. Two are equal if their messages are.
 #[derive(Debug, Clone)]
 pub struct SourceDamage(Arc<dyn Error + Send + Sync>);
 
 impl SourceDamage {
-    /// Of what a reader found.
+    /// Wraps the damage that a reader found.
     pub fn new(found: impl Error + Send + Sync + 'static) -> Self {
         Self(Arc::new(found))
     }
 
-    /// What the reader found, where it is of that type.
+    /// The reader's damage, if it is of that type.
     #[must_use]
     pub fn downcast_ref<T: Error + 'static>(&self) -> Option<&T> {
         self.0.downcast_ref()

@@ -14,7 +14,7 @@ pub struct Time {
 }
 
 impl Time {
-    /// The earliest time there is.
+    /// The earliest time.
     pub const ZERO: Self = Self { sec: 0, nsec: 0 };
 
     /// The time `nanos` nanoseconds after the epoch; the year 2106 and later become the last second before it.
@@ -32,7 +32,7 @@ impl Time {
         }
     }
 
-    /// The time nearest to `seconds` after the epoch; before the epoch, and NaN, it is [`Time::ZERO`].
+    /// The time nearest to `seconds` after the epoch; for times before the epoch, and NaN, it is [`Time::ZERO`].
     #[must_use]
     pub fn from_seconds(seconds: f64) -> Self {
         // `as` saturates: neither infinity nor NaN panics.
@@ -53,7 +53,7 @@ impl Time {
         f64::from(self.sec) + f64::from(self.nsec) * 1e-9
     }
 
-    /// Seconds from `earlier` to this time, negative where `earlier` is later.
+    /// Seconds from `earlier` to this time; negative if `earlier` is later.
     #[must_use]
     pub fn seconds_since(self, earlier: Self) -> f64 {
         (i128::from(self.nanos()) - i128::from(earlier.nanos())) as f64 / NANOS as f64
@@ -62,7 +62,7 @@ impl Time {
 
 impl Ord for Time {
     fn cmp(&self, other: &Self) -> Ordering {
-        // Equal only where both numbers are, as `Eq` has it, even with nanoseconds beyond 10⁹.
+        // Equal only if both numbers are, consistent with `Eq`, even with nanoseconds beyond 10⁹.
         (self.nanos(), self.sec).cmp(&(other.nanos(), other.sec))
     }
 }

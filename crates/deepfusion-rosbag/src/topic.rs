@@ -33,7 +33,7 @@ impl TopicInfo {
         (self.count > 1 && seconds > 0.0).then(|| (self.count - 1) as f64 / seconds)
     }
 
-    /// Connections gathered by topic, in order of names; each with the times of its first and last message.
+    /// Connections grouped by topic, in order of names; each with the times of its first and last message.
     #[must_use]
     pub fn gather<'a>(
         connections: impl IntoIterator<Item = (&'a Connection, Option<(Time, Time)>)>,
@@ -70,7 +70,7 @@ pub(crate) fn topics(bag: &Bag) -> Vec<TopicInfo> {
     topics
 }
 
-/// Connections gathered by topic, without their times.
+/// Connections grouped by topic, without their times.
 pub(crate) fn group(connections: &[Connection]) -> Vec<TopicInfo> {
     TopicInfo::gather(connections.iter().map(|connection| (connection, None)))
 }
@@ -84,8 +84,8 @@ pub fn hull(a: Option<(Time, Time)>, b: Option<(Time, Time)>) -> Option<(Time, T
     }
 }
 
-/// The times of a topic's first and last message. Of a chunk that cannot be read, those of the whole chunk count: reading its
-/// messages reports what is wrong with it, and the rest of the bag is not lost.
+/// The times of a topic's first and last message. For a chunk that cannot be read, those of the whole chunk count: reading its
+/// messages reports the error, and the rest of the bag is not lost.
 fn range(bag: &Bag, topic: &str) -> Option<(Time, Time)> {
     let of_topic = |place: u32| bag.connections()[place as usize].topic == topic;
     let mut chunks: Vec<&ChunkInfo> = bag
@@ -98,7 +98,7 @@ fn range(bag: &Bag, topic: &str) -> Option<(Time, Time)> {
         })
         .collect();
     let (mut first, mut last): (Option<Time>, Option<Time>) = (None, None);
-    // By the chunks' own ranges: once a chunk begins after the best first time, none of the others can beat it.
+    // In order of the chunks' own ranges: once a chunk begins after the best first time, no later chunk can improve it.
     chunks.sort_by_key(|info| info.first);
     for info in &chunks {
         if first.is_some_and(|first| info.first > first) {
@@ -120,7 +120,7 @@ fn range(bag: &Bag, topic: &str) -> Option<(Time, Time)> {
     first.zip(last)
 }
 
-/// The times of a chunk's messages of one topic; of a chunk with index data, by that alone. `None` where it cannot be read.
+/// The times of a chunk's messages of one topic, from the index data alone if there is any. `None` if the chunk cannot be read.
 fn times(
     bag: &Bag,
     info: &ChunkInfo,

@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Offsets within a chunk are 32-bit, and other readers hold a chunk's length in an i32.
+/// Offsets within a chunk are 32-bit, and other readers keep a chunk's length in an i32.
 const LARGEST_CHUNK: usize = i32::MAX as usize;
 
 /// Options for writing a bag.
@@ -67,7 +67,7 @@ pub struct BagWriter {
 #[derive(Default)]
 struct OpenChunk {
     content: Vec<u8>,
-    /// Of each connection the times and offsets of its messages.
+    /// The times and offsets of each connection's messages.
     index: BTreeMap<u32, Vec<(Time, u32)>>,
     range: Option<(Time, Time)>,
 }
@@ -179,7 +179,7 @@ impl BagWriter {
                 connection: connection.0,
             });
         };
-        // Room for the records' headers, twice what they take.
+        // Reserves space for the records' headers, twice what they take.
         let needed = message.len().saturating_add(definition.len() + 128);
         if needed > LARGEST_CHUNK {
             return self.check(
@@ -275,7 +275,7 @@ impl BagWriter {
         ];
         record(&mut self.chunk_infos, op::CHUNK_INFO, &fields, &counts);
         self.chunks += 1;
-        // The buffer serves the next chunk.
+        // The buffer is reused for the next chunk.
         self.chunk.content = chunk.content;
         self.chunk.content.clear();
         Ok(())
@@ -306,7 +306,7 @@ impl OpenChunk {
     fn add(&mut self, connection: u32, definition: &[u8], time: Time, message: &[u8]) {
         let entries = self.index.entry(connection).or_default();
         if entries.is_empty() {
-            // Once a chunk, not once a bag: a chunk can then be understood where others are lost.
+            // Once per chunk, not once per bag: a chunk can then be read even if others are lost.
             self.content.extend_from_slice(definition);
         }
         entries.push((time, self.content.len() as u32));

@@ -7,7 +7,7 @@ use deepfusion_rosbag::{
 };
 use std::path::Path;
 
-/// Every third message each, so that the bags' times interleave; the topics' numbers differ from bag to bag.
+/// Every third message goes to each bag, so that the bags' times interleave; the topics' numbers differ from bag to bag.
 fn part(path: &Path, k: u32, compression: Compression) {
     let mut bag = BagWriter::create(
         path,
@@ -38,7 +38,7 @@ fn parts(folder: &Path) -> Vec<std::path::PathBuf> {
         part(&path, k, compression);
         path
     };
-    // In another order than that of their times.
+    // Not in the order of their times.
     (0..3).rev().zip(compressions).map(write).collect()
 }
 
@@ -94,7 +94,7 @@ fn connections_are_merged_by_topic_and_md5() {
     assert_eq!(topics.len(), 4);
     let shared = topics.iter().find(|t| t.name == "/shared").unwrap();
     assert_eq!(shared.rate_hz(), Some(1.0));
-    // A topic that only one of the bags has.
+    // A topic in only one of the bags.
     let selection = Selection::topics(["/only/1"])
         .from(Time { sec: 10, nsec: 0 })
         .until(Time { sec: 19, nsec: 0 });

@@ -1,4 +1,4 @@
-//! Bags that were cut, changed, or never finished: no panic, and what lies before the break is there.
+//! Bags that were cut, changed, or never finished: no panic, and everything before the damage is read.
 
 use crate::common::{reference, sha256};
 use deepfusion_hint::Hint;
@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 
 const COMPRESSIONS: [Compression; 3] = [Compression::None, Compression::Lz4, Compression::Bz2];
 
-/// Decompressing on demand: a thread for each of thousands of tiny bags would be slow.
+/// Decompresses on demand: starting threads for each of thousands of tiny bags would be slow.
 const OPTIONS: BagOptions = BagOptions {
     max_chunk_bytes: 1 << 20,
     threads: 0,
@@ -55,7 +55,7 @@ fn write_small(compression: Compression) -> Vec<u8> {
             .unwrap()
     });
     for i in 0..20_u32 {
-        // A header as a message: bytes of different lengths.
+        // A header as a message: its length in bytes varies.
         let message: Vec<u8> = (0..40 + i % 7).map(|k| (k * i) as u8).collect();
         let time = Time {
             sec: 100 + i,
@@ -81,8 +81,8 @@ fn read(bag: &Bag) -> (Vec<(Time, String)>, usize) {
     (found, errors)
 }
 
-/// How many messages must be found before byte `cut`, and how many can be: those of a compressed chunk must where the
-/// whole chunk lies before it, and can where its beginning does.
+/// How many messages must be found before byte `cut`, and how many can be: those of a compressed chunk must if the
+/// whole chunk lies before it, and can if its beginning does.
 fn whole_before(bytes: &[u8], cut: usize, compression: Compression) -> (usize, usize) {
     let record = |at: usize| {
         let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
@@ -121,7 +121,7 @@ fn a_bag_cut_at_any_byte_gives_what_lies_before() {
         let bytes = small(compression);
         let (all, errors) = read(&open(bytes.clone()).unwrap());
         assert_eq!((all.len(), errors), (20, 0));
-        // A bzip2 decoder takes megabytes to set up: every 11th byte there, every one otherwise.
+        // A bzip2 decoder takes megabytes to set up: every 11th byte is tried there, every one otherwise.
         let step = if compression == Compression::Bz2 {
             11
         } else {
@@ -181,7 +181,7 @@ fn a_bag_that_was_never_finished_is_read_and_says_so() {
 
 #[test]
 fn a_chunk_whose_length_was_never_filled_in_is_read_to_the_end() {
-    // The recorder writes a chunk's header with zeros, then its content, then comes back for the lengths.
+    // The recorder writes a chunk's header with zeros, then its content, then returns to fill in the lengths.
     let mut bytes = small(Compression::None);
     let index_pos = find(&bytes, b"index_pos=") + 10;
     bytes[index_pos..index_pos + 8].fill(0);
@@ -253,7 +253,7 @@ fn a_damaged_chunk_is_an_error_and_the_others_are_read() {
 
 #[test]
 fn lengths_that_lie_take_no_memory() {
-    // A chunk that promises 2 GiB of a few bytes; a bag header that counts 2³² connections and chunks.
+    // A chunk of a few bytes that claims 2 GiB; a bag header that counts 2³² connections and chunks.
     for compression in [Compression::Lz4, Compression::Bz2] {
         let mut bytes = small(compression);
         let size = find(&bytes, b"size=") + 5;
@@ -388,7 +388,7 @@ proptest! {
         ignore_index: bool,
     ) {
         let mut bytes = small(COMPRESSIONS[which]);
-        // Not in the 4 KiB of padding, where most would land.
+        // Not in the 4 KiB of padding, where most changes would land.
         let body = bytes.len() - 4109;
         for (index, byte) in changes {
             let place = index.index(body + 80);

@@ -1,5 +1,5 @@
-//! Messages of frames, and of a velocity with a covariance, against what PyPI's `rosbags` writes (`reference/frames_reference.py`);
-//! exactly, in each way of writing them.
+//! Messages of frames, and of a velocity with a covariance, compared exactly with what PyPI's `rosbags` writes
+//! (`reference/frames_reference.py`), in each serialisation.
 
 use crate::common::{Lines, lines_of, read_json};
 use deepfusion_rosbag::RosMessage;
@@ -25,7 +25,7 @@ fn bytes(hex: &str) -> Vec<u8> {
         .collect()
 }
 
-/// The lines but for the sequence numbers, which ROS 2 has none of.
+/// The lines without the sequence numbers, which ROS 2 does not have.
 fn unnumbered(lines: Vec<String>) -> Vec<String> {
     let numbered = |line: &String| !line.contains("header.seq = ");
     lines.into_iter().filter(numbered).collect()

@@ -1,4 +1,4 @@
-//! Pixels of Bayer patterns, YUV and 16 bits against OpenCV (`reference/opencv_images.py`), as a message of a bag carries them.
+//! Pixels of Bayer patterns, YUV and 16 bits compared with OpenCV (`reference/opencv_images.py`), in messages as a bag holds them.
 
 use crate::common::read_json;
 use deepfusion_rosbag::msg::{Header, Image};
@@ -27,8 +27,9 @@ fn bytes(hex: &str) -> Vec<u8> {
         .collect()
 }
 
-/// The formulas are OpenCV's own in whole numbers, so that nothing is left to tolerate but at the edge of a Bayer pattern. There OpenCV copies what it found
-/// one pixel further in, while here the missing colours are interpolated from what is there, and the two differ freely on random pixels.
+/// The formulas are OpenCV's own in integers, so the results must be equal, except at the edge of a Bayer pattern. There OpenCV copies the
+/// result from one pixel further in, while here the missing colours are interpolated from the existing ones. On random pixels the two
+/// differ freely.
 #[test]
 fn every_encoding_is_what_opencv_makes_of_it() {
     let mut seen = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! ROS 1 bags, beside what the `rosbags` package reads.
+//! ROS 1 bags, compared with what the `rosbags` package reads.
 
 #![allow(
     clippy::unwrap_used,

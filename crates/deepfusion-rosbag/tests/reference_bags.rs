@@ -1,4 +1,4 @@
-//! Bags that PyPI's `rosbags` wrote, read to the values that it reads (`reference/rosbags_reference.py`); exactly.
+//! Bags that PyPI's `rosbags` wrote, read to exactly the values that it reads (`reference/rosbags_reference.py`).
 
 use crate::common::{lines, number, read_json, real_bags, reference, sha256};
 use deepfusion_rosbag::msg::*;
@@ -147,7 +147,7 @@ fn pixels_are_what_numpy_reads() {
     );
 }
 
-/// Runs `check` on every message of the uncompressed bag; how many it took.
+/// Runs `check` on every message of the uncompressed bag, and returns for how many it was `Some`.
 fn check_each(check: impl Fn(&Expected, &Message<'_>) -> Option<()>) -> usize {
     let expected: EveryType = read_json("every_type.json");
     let bag = Bag::open(reference("every_type_none.bag")).unwrap();
@@ -208,7 +208,7 @@ fn topics_have_count_range_and_rate() {
 fn check_type<'a, T: RosMessage<'a>>(types: &mut BTreeMap<String, Type>) {
     let expected = types
         .remove(T::TYPE)
-        .unwrap_or_else(|| panic!("{} is no type of rosbags", T::TYPE));
+        .unwrap_or_else(|| panic!("{} is not a type of rosbags", T::TYPE));
     assert_eq!(T::MD5, expected.md5, "{}", T::TYPE);
     assert_eq!(T::DEFINITION, expected.definition, "{}", T::TYPE);
 }
@@ -319,7 +319,7 @@ fn real_bags_hold_what_rosbags_reads() {
     }
 }
 
-/// Of every message's time, topic and bytes. Messages of one time have no order of their own, hence the sorting.
+/// A checksum of every message's time, topic and bytes. Messages with equal times have no order of their own, so they are sorted.
 fn digest(bag: &Bag) -> String {
     let mut last = Time::ZERO;
     let mut all = Vec::new();

@@ -1,5 +1,5 @@
-//! Messages of video streams against what PyPI's `rosbags` writes (`reference/video_reference.py`); exactly, in each way of writing
-//! them.
+//! Messages of video streams compared exactly with what PyPI's `rosbags` writes (`reference/video_reference.py`), in each
+//! serialisation.
 
 use crate::common::{Lines, lines_of, read_json};
 use deepfusion_rosbag::msg::{CompressedVideo, FfmpegPacket, OldFfmpegPacket};
@@ -14,7 +14,7 @@ struct Type {
     md5: String,
     definition: String,
     ros1: String,
-    /// Empty where there is no such message in ROS 2.
+    /// Empty if there is no such message in ROS 2.
     #[serde(default)]
     cdr: String,
     #[serde(default)]

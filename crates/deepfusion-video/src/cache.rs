@@ -1,4 +1,4 @@
-//! A folder of decoded frames: whole, and of what it says, or not there.
+//! A folder of decoded frames. It is either complete and matches its description, or it does not exist.
 
 use crate::{Error, Result};
 use deepfusion_fs::PartialFolder;
@@ -6,19 +6,20 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-/// What a folder of frames was made from.
+/// The source of a folder of frames.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Origin {
     bytes: u64,
     modified_ns: u128,
     frames: usize,
-    /// Which of several streams of the file; `None` of a video.
+    /// Which of several streams of the file; `None` for a video.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     stream: Option<String>,
-    /// Width and height of the frames where they are not as the file has them.
+    /// Width and height of the frames, if they differ from the file's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     size: Option<(u32, u32)>,
-    /// The file, where its frames are not kept beside it: others of its name may be kept there. Those beside it may be moved with it.
+    /// Path of the file, if its frames are kept elsewhere: frames of other files with the same name may be kept there. Frames beside
+    /// their file may be moved with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     file: Option<String>,
 }
@@ -26,7 +27,8 @@ pub(crate) struct Origin {
 const ORIGIN: &str = "origin.json";
 
 impl Origin {
-    /// Of a file as it is now; of a folder, of all files in it but settings (`.toml`) and hidden ones, which say nothing of the frames.
+    /// The source as it is now: a file, or for a folder all its files except settings (`.toml`) and hidden ones, which do not affect
+    /// the frames.
     ///
     /// # Errors
     /// [`Error::File`].
@@ -55,12 +57,12 @@ impl Origin {
         Ok(origin)
     }
 
-    /// The same with frames of another size than the file has.
+    /// The same source with frames of another size than the file's.
     pub(crate) fn with_size(self, size: Option<(u32, u32)>) -> Self {
         Self { size, ..self }
     }
 
-    /// The same of frames that are kept in `cache`.
+    /// The same source with frames kept in `cache`.
     pub(crate) fn kept_in(self, cache: &Path, file: &Path) -> Self {
         let elsewhere = cache
             .parent()
@@ -71,7 +73,7 @@ impl Origin {
         }
     }
 
-    /// Whether both say which file they are of, and it is not the same.
+    /// Whether both name their file, and the files differ.
     fn is_of_another_file(&self, other: &Self) -> bool {
         self.file.is_some() && other.file.is_some() && self.file != other.file
     }
@@ -87,7 +89,7 @@ impl Origin {
         Ok(())
     }
 
-    /// `None` where the folder is no whole cache.
+    /// `None` if the folder is not a complete cache.
     fn read(cache: &Path) -> Option<Self> {
         let bytes = std::fs::read(cache.join(ORIGIN)).ok()?;
         serde_json::from_slice(&bytes).ok()
@@ -100,8 +102,8 @@ impl Origin {
     }
 }
 
-/// Where the frames of a video, or of a stream in a recording, are kept in `folder`: as `<name>.frames` beside their `file`, and elsewhere as
-/// `<name>-<hash>.frames`, by the hash of the file's path, as recordings of one name may share a folder.
+/// Where the frames of a video, or of a stream in a recording, are kept in `folder`: as `<name>.frames` if it is the folder of `file`,
+/// else as `<name>-<hash>.frames`, with a hash of the file's path, as recordings with the same name may share a folder.
 #[must_use]
 pub fn frames_folder(folder: &Path, file: &Path, name: &str) -> PathBuf {
     if is_beside(file, folder) {
@@ -111,7 +113,7 @@ pub fn frames_folder(folder: &Path, file: &Path, name: &str) -> PathBuf {
     folder.join(format!("{name}-{hash:016x}.frames"))
 }
 
-/// Whether a folder holds the frames of a video as it is now: they are then read from there, and nothing is written.
+/// Whether a folder has the frames of a video as it is now: they are then read from there, and nothing is written.
 #[must_use]
 pub fn holds_frames_of(folder: &Path, video: &Path) -> bool {
     Origin::read(folder).is_some_and(|kept| {
@@ -120,22 +122,22 @@ pub fn holds_frames_of(folder: &Path, video: &Path) -> bool {
     })
 }
 
-/// The hash FNV-1a of 64 bits: the same on every machine and in every version.
+/// The 64-bit hash FNV-1a: the same on every machine and in every version.
 fn fnv_1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3)
     })
 }
 
-/// Whether a folder is the one that a file lies in, however both are named.
+/// Whether a file lies in a folder, however both are written.
 fn is_beside(file: &Path, folder: &Path) -> bool {
     let own = file.parent().unwrap_or(Path::new("."));
     own == folder || real(own) == real(folder)
 }
 
-/// A path without links; of what is not there, as it is.
+/// The path with links resolved; unchanged if it does not exist.
 fn real(path: &Path) -> PathBuf {
-    // The folder of a bare name.
+    // The parent of a bare name is the empty path.
     let path = if path.as_os_str().is_empty() {
         Path::new(".")
     } else {
@@ -145,13 +147,13 @@ fn real(path: &Path) -> PathBuf {
     real.unwrap_or_else(|_| path.to_owned())
 }
 
-/// The file of a frame, counted from 0.
+/// Path of a frame's file; frames are counted from 0.
 pub(crate) fn frame_path(cache: &Path, index: u64) -> PathBuf {
     cache.join(format!("{index:010}.jpg"))
 }
 
-/// Has the frames made in a folder beside the cache, which is renamed when it is whole, unless the cache holds them already.
-///
+/// Calls `make` to decode the frames into a temporary folder, which is renamed when it is complete. Does nothing if the cache
+/// has them already.
 /// # Errors
 /// Those of `make`; [`Error::File`].
 pub(crate) fn keep<E: From<Error>>(
@@ -162,18 +164,18 @@ pub(crate) fn keep<E: From<Error>>(
     if Origin::read(cache).as_ref() == Some(origin) {
         return Ok(());
     }
-    // Of a link, what it leads to: frames are kept where there is room for them.
+    // A link is followed: frames are kept where there is space for them.
     let real = cache.canonicalize();
     let cache = real.as_deref().unwrap_or(cache);
-    // What cannot be replaced in the end is said before hours of decoding.
+    // A folder that cannot be replaced in the end is an error now, not after hours of decoding.
     let in_the_way = match Origin::read(cache) {
         Some(before) if before.is_of_another_file(origin) => {
-            Some("it holds the frames of another file: delete it")
+            Some("the folder has the frames of another file: delete it")
         }
         Some(_) => None,
         None => std::fs::read_dir(cache)
             .is_ok_and(|mut files| files.next().is_some())
-            .then_some("it holds other files, or a part of the frames: delete it"),
+            .then_some("the folder has other files, or only some of the frames: delete it"),
     };
     if let Some(why) = in_the_way {
         let why = std::io::Error::new(std::io::ErrorKind::AlreadyExists, why);
@@ -197,7 +199,7 @@ fn fill<E: From<Error>>(
     let part = PartialFolder::beside(cache).map_err(failed)?;
     make(part.path())?;
     origin.write(part.path())?;
-    // Of another video, or of this one before it changed.
+    // From another video, or from this one before it changed.
     let is_old = Origin::read(cache).is_some_and(|old| old != *origin);
     let committed = if is_old {
         part.commit_replacing()
@@ -211,7 +213,7 @@ fn fill<E: From<Error>>(
 mod tests {
     use super::*;
 
-    /// A video that is so long, and its cache.
+    /// A video of this length, and its cache.
     fn video(folder: &Path, bytes: usize) -> (PathBuf, Origin) {
         let video = folder.join("drive.mp4");
         std::fs::write(&video, vec![0_u8; bytes]).unwrap();
@@ -234,7 +236,7 @@ mod tests {
     fn frames_are_made_once_and_anew_for_another_video() {
         let folder = tempfile::tempdir().unwrap();
         let (cache, origin) = video(folder.path(), 3);
-        let never = |_: &Path| -> Result<()> { panic!("they are there") };
+        let never = |_: &Path| -> Result<()> { panic!("the frames exist already") };
         keep(&cache, &origin, frame("first")).unwrap();
         keep(&cache, &origin, never).unwrap();
         let (cache, origin) = video(folder.path(), 4);
@@ -244,7 +246,7 @@ mod tests {
         assert_eq!(names(&cache), ["drive.mp4.frames"]);
     }
 
-    /// Two drives whose cameras' files have one name, and one place for the frames of both.
+    /// Two drives whose cameras' files have the same name, with one folder for the frames of both.
     #[test]
     fn videos_of_one_name_share_no_frames() {
         let root = tempfile::tempdir().unwrap();
@@ -260,15 +262,15 @@ mod tests {
             (day, video, cache, origin)
         });
         for (day, video, cache, origin) in &kept {
-            let never = |_: &Path| -> Result<()> { panic!("they are there") };
+            let never = |_: &Path| -> Result<()> { panic!("the frames exist already") };
             keep(cache, origin, never).unwrap();
             let text = std::fs::read_to_string(frame_path(cache, 0)).unwrap();
             assert_eq!(text, *day);
-            // Neither the folder's being there nor another name of the file changes its place.
+            // Neither creating the folder nor another spelling of the file's path changes its place.
             let other_name = root.path().join("monday/..").join(day).join("front.mp4");
             let again = frames_folder(&scratch, &other_name, "front.mp4");
             assert_eq!(again, *cache);
-            // Beside it, it needs nobody's name but its own, and may be moved with it.
+            // Beside the file, the file's name suffices, and both may be moved together.
             let own = video.parent().unwrap();
             let beside = frames_folder(own, video, "front.mp4");
             assert_eq!(beside, own.join("front.mp4.frames"));
@@ -276,7 +278,7 @@ mod tests {
             assert_eq!(moved.file, None);
             assert_eq!(moved.kept_in(&beside, video).file, None);
         }
-        // What says that it is another's is not replaced.
+        // A folder that names another file is not replaced.
         let [(.., cache, _), (.., other)] = &kept;
         let refused = keep(cache, other, frame("another")).unwrap_err();
         assert!(refused.to_string().contains("another file"), "{refused}");
@@ -301,7 +303,7 @@ mod tests {
         }
     }
 
-    /// The values of the algorithm's own page.
+    /// The values on the algorithm's own page.
     #[test]
     fn the_hash_is_fnv_1a() {
         assert_eq!(fnv_1a(b""), 0xCBF2_9CE4_8422_2325);

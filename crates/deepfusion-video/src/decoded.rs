@@ -1,35 +1,35 @@
-//! Whether frames are decoded: found out once, by whoever asks first.
+//! Whether frames can be decoded: found out once, by the first caller.
 
 use crate::Error;
 use deepfusion_hint::Hint;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// What failed may go well later: somebody stopped ffmpeg, or has installed it, or made room. It is tried again a few times, not at once.
+/// What failed may succeed later, if ffmpeg was stopped, has been installed, or space was freed. It is tried a few times, not at once.
 const TRIES: u32 = 4;
 /// See [`TRIES`].
 const PAUSE: Duration = Duration::from_secs(10);
 
-/// Whether all frames are kept in their folder, or why they cannot be; `None` until the first is asked for. Locked while they are made.
+/// Whether all frames are in their folder, or why they cannot be; `None` until the first is requested. Locked while they are decoded.
 #[derive(Debug, Default)]
 pub(crate) struct Decoded(Mutex<Option<Result<(), Refusal>>>);
 
-/// Why frames could not be decoded, in the words of the error that said so first.
+/// Why frames could not be decoded: the message of the first error.
 #[derive(Debug, Clone)]
 struct Refusal {
     said: String,
     hint: Option<String>,
     when: Instant,
-    /// How often it was tried.
+    /// Number of attempts.
     tries: u32,
 }
 
 impl Decoded {
-    /// Has the frames made by the first call alone. What failed then is said again by the others: a video that is damaged, or larger than the
-    /// disk, is not decoded anew for each of its frames, but a few times at most.
+    /// Calls `make` on the first call only. A failure is repeated to the other callers: a video that is damaged, or larger than the
+    /// disk, is not decoded again for each of its frames, but a few times at most.
     ///
     /// # Errors
-    /// Those of `make`; [`Error::NotDecoded`] in their words where it failed before.
+    /// Those of `make`; [`Error::NotDecoded`] with their message if it failed before.
     pub(crate) fn once<E: From<Error> + Hint>(
         &self,
         make: impl FnOnce() -> Result<(), E>,
@@ -59,7 +59,7 @@ impl Refusal {
         let mut cause = error.source();
         while let Some(error) = cause {
             let text = error.to_string();
-            // Many messages already hold their cause's.
+            // Many messages already contain their cause's message.
             if !said.contains(&text) {
                 said += &format!(": {text}");
             }
@@ -96,7 +96,7 @@ mod tests {
         let first = decoded.once(|| Err(full())).unwrap_err();
         assert!(matches!(first, Error::File { .. }));
         for _ in 0..2 {
-            let again = decoded.once(|| -> Result<(), Error> { panic!("a second time") });
+            let again = decoded.once(|| -> Result<(), Error> { panic!("called a second time") });
             let again = again.unwrap_err();
             assert!(matches!(again, Error::NotDecoded { .. }));
             assert_eq!(again.to_string(), full().to_string());

@@ -1,8 +1,8 @@
-//! Which files are videos, by their names.
+//! Which files are videos, judged by their names.
 
 use std::path::Path;
 
-/// Endings of the files that are taken for videos, in small letters.
+/// Endings of file names that are taken as videos, in lower case.
 pub const VIDEO_ENDINGS: [&str; 7] = ["mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm"];
 
 /// Whether a file is named like a video.

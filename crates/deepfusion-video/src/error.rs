@@ -11,25 +11,25 @@ pub enum Error {
     /// A file could not be opened, read or written.
     #[error("{}: {}", path.display(), said(source))]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A picture cannot be read.
     #[error("{}: cannot be decoded: {source}", path.display())]
     Picture {
-        /// The picture.
+        /// Path of the picture.
         path: PathBuf,
-        /// Why not.
+        /// The decoder's error.
         source: image::ImageError,
     },
-    /// ffmpeg or ffprobe failed, or is not there.
+    /// ffmpeg or ffprobe failed, or is not installed.
     #[error("{}: {program} {problem}", path.display())]
     Program {
         /// The file or address that it should have read or written.
         path: PathBuf,
-        /// The program.
+        /// Name of the program.
         program: &'static str,
         /// What happened.
         problem: ProgramProblem,
@@ -37,58 +37,58 @@ pub enum Error {
     /// A packet of a stream cannot be decoded.
     #[error("{}: {stream}, message {number}: {problem}", path.display())]
     Packet {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
-        /// The stream's name in it.
+        /// Name of the stream in the recording.
         stream: String,
-        /// Which of the stream's messages, counted from 0.
+        /// Number of the message in the stream, counted from 0.
         number: u64,
-        /// Why not.
+        /// Why it cannot be decoded.
         problem: PacketProblem,
     },
-    /// A stream of a codec that is not read.
-    #[error("{}: {stream}: a video of format `{format}` is not read", path.display())]
+    /// The codec of a stream is not supported.
+    #[error("{}: {stream}: video format `{format}` is not supported", path.display())]
     Codec {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
-        /// The stream's name in it.
+        /// Name of the stream in the recording.
         stream: String,
-        /// The format's name.
+        /// Name of the format.
         format: String,
     },
-    /// Frames that could not be decoded when the first of them was asked for: they are not decoded anew for each.
+    /// Frames could not be decoded when the first was requested. They are not decoded again for each frame.
     #[error("{said}")]
     NotDecoded {
-        /// What was wrong then.
+        /// The message of that error.
         said: String,
-        /// What to do about it.
+        /// The hint of that error.
         hint: Option<String>,
     },
-    /// Nothing says which camera is meant.
-    #[error("{address} names no camera")]
+    /// The address does not say which camera is meant.
+    #[error("{address} does not name a camera")]
     NoCameraName {
-        /// What was given.
+        /// The address.
         address: String,
     },
-    /// What a camera is to give is not understood.
+    /// The settings of a camera are not understood.
     #[error("{address}: {problem}")]
     CameraMode {
-        /// The camera, with what is asked of it.
+        /// The camera with its settings.
         address: String,
-        /// Why not.
+        /// What is wrong with the settings.
         #[source]
         problem: CameraModeProblem,
     },
-    /// A live source gives no frame for longer than is waited for.
+    /// A live source sends no frame within the timeout.
     #[error("{address}: ffmpeg gave no frame for {} s{}{}", waited.as_secs_f64(), after(*frames), quoted(said))]
     Silent {
-        /// The source, without its password.
+        /// Address of the source, without its password.
         address: String,
-        /// For how long.
+        /// The timeout.
         waited: Duration,
-        /// How many frames had come.
+        /// Number of frames received before.
         frames: u64,
-        /// What ffmpeg said last.
+        /// The last lines that ffmpeg printed.
         said: Vec<String>,
     },
 }
@@ -97,7 +97,7 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// An error of the system's at `path`.
+    /// An error of the operating system about `path`.
     #[must_use]
     pub fn file(path: &Path, source: std::io::Error) -> Self {
         let path = path.to_owned();
@@ -109,26 +109,26 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
             Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
-            Self::Picture { .. } => "PNG and JPEG are read",
+            Self::Picture { .. } => "give a PNG or JPEG image",
             Self::Program { problem, .. } => return problem.hint(),
             Self::Packet { problem, .. } => return problem.hint(),
             Self::NotDecoded { hint, .. } => return hint.clone(),
             Self::Codec { .. } => {
-                "h264, h265 (hevc), vp9 and av1 are read: encode the stream as one of them, or record images"
+                "encode the stream as h264, h265 (hevc), vp9 or av1, or record images"
             }
             Self::NoCameraName { .. } => {
-                "the camera's number or name stands behind it: camera:0 is the first"
+                "give the camera's number or name after it: camera:0 is the first"
             }
             Self::CameraMode { .. } => {
-                "any of size=1920x1080, fps=30 and format=mjpeg may stand behind the camera's `?`, with & between them"
+                "give any of size=1920x1080, fps=30 and format=mjpeg after the camera's `?`, separated by &"
             }
-            Self::Silent { .. } => "is the source sending? A longer timeout waits for it",
+            Self::Silent { .. } => "check that the source is sending, or set a longer timeout",
         };
         Some(text.to_owned())
     }
 }
 
-/// The system's words, but for the most usual of them.
+/// The system's message, or a plainer one for the most usual errors.
 fn said(error: &std::io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => "no such file or folder".into(),
@@ -136,7 +136,7 @@ fn said(error: &std::io::Error) -> String {
     }
 }
 
-/// How many frames had come before, if any had.
+/// Says how many frames were received before, if any.
 fn after(frames: u64) -> String {
     match frames {
         0 => String::new(),

@@ -1,9 +1,9 @@
 //! A video's frames as files.
 //!
 //! Training reads frames in random order, which a video cannot give: every jump decodes from the last
-//! key frame. So all frames are decoded once, into `<video>.frames` in a folder that the caller names
-//! ([`frames_folder`]), as JPEGs of ffmpeg's best quality but one; the folder can be deleted at any time. It is filled under
-//! another name and renamed when it is whole.
+//! key frame. So all frames are decoded once, into `<video>.frames` in a folder that the caller chooses
+//! ([`frames_folder`]), as JPEGs of ffmpeg's second best quality. The folder can be deleted at any time. It is filled under
+//! a temporary name and renamed when it is complete.
 
 use crate::cache::{Origin, frame_path, frames_folder, keep};
 use crate::decoded::Decoded;
@@ -13,7 +13,7 @@ use crate::{Error, ProgramProblem, ProgramTask, Result};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// A video's frames: counted when it is opened, decoded when the first of them is asked for.
+/// A video's frames: counted when it is opened, decoded when the first of them is requested.
 #[derive(Debug)]
 pub struct VideoFrames {
     file: PathBuf,
@@ -42,42 +42,42 @@ impl VideoFrames {
         })
     }
 
-    /// The video.
+    /// Path of the video.
     #[must_use]
     pub fn file(&self) -> &Path {
         &self.file
     }
 
-    /// How many frames there are.
+    /// Number of frames.
     #[must_use]
     pub fn count(&self) -> usize {
         self.probed.frames
     }
 
-    /// Width and height of the frames as shown, the recorder's rotation applied, and pixels that are not square made so.
+    /// Width and height of the frames as shown, with the recorder's rotation applied and non-square pixels made square.
     #[must_use]
     pub fn size(&self) -> (u32, u32) {
         self.probed.size
     }
 
-    /// The frames' times in order, in nanoseconds; `None` where the file has none.
+    /// The frames' times in order, in nanoseconds; `None` if the file has none.
     #[must_use]
     pub fn times_ns(&self) -> Option<&[i64]> {
         self.probed.times_ns.as_deref()
     }
 
-    /// When the recorder says that the video was made, in nanoseconds since 1970: its first frame of some recorders, its last
-    /// of others.
+    /// The video's creation time according to the recorder, in nanoseconds since 1970: some recorders write that of the first frame, others
+    /// that of the last.
     #[must_use]
     pub fn created_ns(&self) -> Option<i64> {
         self.probed.created_ns
     }
 
-    /// The JPEG of a frame, counted from 0; the first call decodes the whole video, unless that was done before.
+    /// Path of a frame's JPEG, counted from 0; the first call decodes the whole video, unless that was done before.
     ///
     /// # Errors
-    /// [`Error::Program`] where the video cannot be decoded, [`Error::File`] where its frames cannot be kept; [`Error::NotDecoded`] in the same
-    /// words for every frame that is asked for after that.
+    /// [`Error::Program`] if the video cannot be decoded, [`Error::File`] if its frames cannot be kept; [`Error::NotDecoded`] with the same
+    /// message for every frame that is requested after that.
     pub fn frame(&self, index: u64) -> Result<PathBuf> {
         self.decoded.once(|| self.decode_all())?;
         Ok(frame_path(&self.cache, index))
@@ -99,7 +99,7 @@ fn decode(video: &Path, part: &Path, probed: &Probed) -> Result<()> {
     let frames = probed.frames;
     let (width, height) = probed.size;
     let scale = (!probed.square).then(|| format!("scale={width}:{height},setsar=1"));
-    // One file a frame: none doubled or dropped to keep a rate.
+    // One file per frame: none is duplicated or dropped to keep a rate.
     in_either_words(|mode| ffmpeg(video, part, mode, scale.as_deref()))?
         .succeeded("ffmpeg", (video, ProgramTask::Read))?;
     let written = std::fs::read_dir(part)
@@ -138,7 +138,7 @@ fn ffmpeg(video: &Path, part: &Path, mode: &str, filter: Option<&str>) -> Result
     if let Some(filter) = filter {
         arguments.extend([OsStr::new("-vf"), filter.as_ref()]);
     }
-    // Within the folder: a `%` in its own path would count as a number's place.
+    // Relative to the folder: a `%` in its own path would count as a placeholder for the number.
     arguments.push("%010d.jpg".as_ref());
     outcome("ffmpeg", &arguments, (video, ProgramTask::Read), part, None)
 }

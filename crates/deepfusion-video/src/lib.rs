@@ -1,7 +1,8 @@
-//! Videos, cameras and streams, all through the ffmpeg that the user has installed.
+//! Videos, cameras and streams, all through the user's installed ffmpeg.
 //!
-//! [`VideoFrames`] gives a file's frames in any order, [`PacketFrames`] those of a stream that lies in messages, [`write_video`] makes a file of pictures, and [`LiveSource`] takes the
-//! newest frame of a camera or stream. Without ffmpeg each says so, and what to do; nothing is linked.
+//! [`VideoFrames`] gives a file's frames in any order, [`PacketFrames`] those of a stream in messages, [`write_video`] writes pictures as
+//! a video, and [`LiveSource`] gives the newest frame of a camera or stream. Without ffmpeg each returns an error with a hint; nothing
+//! is linked.
 
 mod cache;
 mod decoded;

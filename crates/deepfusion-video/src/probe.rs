@@ -1,4 +1,4 @@
-//! What ffprobe says of a video, without decoding it.
+//! What ffprobe reports about a video, without decoding it.
 
 use crate::program::run;
 use crate::{AnswerProblem, Error, ProgramTask, Result};
@@ -13,16 +13,16 @@ const RECORDED_S: RangeInclusive<i64> = 946_684_800..=4_102_444_800;
 /// A video's frames before they are decoded.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Probed {
-    /// Width and height as shown, the recorder's rotation applied, pixels made square.
+    /// Width and height as shown, with the recorder's rotation applied and pixels made square.
     pub(crate) size: (u32, u32),
     /// Whether its pixels are square as they are stored.
     pub(crate) square: bool,
-    /// How many.
+    /// Number of frames.
     pub(crate) frames: usize,
-    /// Their times in order, in nanoseconds; `None` where the file has none.
+    /// The frames' times in order, in nanoseconds; `None` if the file has none.
     pub(crate) times_ns: Option<Vec<i64>>,
-    /// When the recorder says that the video was made, in nanoseconds since 1970: its first frame of some recorders, its last of
-    /// others.
+    /// The video's creation time according to the recorder, in nanoseconds since 1970: some recorders write that of the first frame, others
+    /// that of the last.
     pub(crate) created_ns: Option<i64>,
 }
 
@@ -68,7 +68,7 @@ struct SideData {
     rotation: Option<f64>,
 }
 
-/// Looks at the first video stream. Its packets are listed rather than its frames: that needs no decoding,
+/// Examines the first video stream. Its packets are listed rather than its frames: that needs no decoding,
 /// and each packet is a frame.
 pub(crate) fn probe(file: &Path) -> Result<Probed> {
     let entries = "packet=pts_time,flags:stream=width,height,sample_aspect_ratio:stream_side_data=rotation:format_tags=creation_time";
@@ -111,7 +111,7 @@ fn parse(json: &[u8]) -> std::result::Result<Probed, AnswerProblem> {
     let upright = rotations
         .next_back()
         .is_none_or(|r| (r / 90.0).round() % 2.0 == 0.0);
-    // `D`: cut off by the file's edit list, not shown and not decoded into a frame.
+    // `D`: removed by the file's edit list, not shown and not decoded into a frame.
     let shown: Vec<&Packet> = answer
         .packets
         .iter()
@@ -140,8 +140,8 @@ fn parse(json: &[u8]) -> std::result::Result<Probed, AnswerProblem> {
     })
 }
 
-/// By how much pixels are wider than high: film for television was stored narrower than it is shown. What differs by less than a percent is a
-/// rounding of the recorder's.
+/// Ratio of a pixel's width to its height: videos for television were stored narrower than shown. A difference below one percent is
+/// a rounding of the recorder's.
 fn stretch(aspect: Option<&str>) -> f64 {
     let ratio = aspect.and_then(|text| {
         let (x, y) = text.split_once(':')?;
@@ -153,13 +153,13 @@ fn stretch(aspect: Option<&str>) -> f64 {
         .unwrap_or(1.0)
 }
 
-/// Decimal seconds, kept to the last digit.
+/// Decimal seconds, exact to the last digit.
 fn nanoseconds(seconds: &str) -> Option<i64> {
     let time: SignedDuration = format!("{seconds}s").parse().ok()?;
     i64::try_from(time.as_nanos()).ok()
 }
 
-/// A date with its zone; recorders without a clock write 1904 or 1970, which is none.
+/// A date with its zone; recorders without a clock write 1904 or 1970, which is not a date.
 fn created(word: Option<&str>) -> Option<i64> {
     let stamp: Timestamp = word?.parse().ok()?;
     let known = RECORDED_S.contains(&stamp.as_second());

@@ -1,4 +1,4 @@
-//! What can be wrong with a program, and with what it reads.
+//! What can be wrong with a program, and with its input.
 
 mod live;
 mod packet;
@@ -10,13 +10,13 @@ pub use self::packet::PacketProblem;
 use deepfusion_hint::{Hint, count_of};
 use std::fmt;
 
-/// What a program was to do.
+/// The task of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ProgramTask {
     /// Read a video, or packets of one.
     Read,
-    /// Write one.
+    /// Write a video.
     Write,
     /// Read a camera or a stream.
     ReadLive,
@@ -36,63 +36,63 @@ impl fmt::Display for ProgramTask {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProgramProblem {
-    /// It is not there.
+    /// The program is not installed.
     #[error("is needed to {0} and is not installed")]
     NotInstalled(ProgramTask),
-    /// The system does not run it.
+    /// The system does not run the program.
     #[error("cannot be run: {0}")]
     NotRun(#[source] std::io::Error),
-    /// It failed.
+    /// The program failed.
     #[error("failed: {said}")]
     Failed {
-        /// What it was to do.
+        /// The task of the program.
         task: ProgramTask,
-        /// What it said.
+        /// What it printed.
         said: String,
     },
-    /// It lacks a decoder, or room for its pictures.
+    /// The program lacks a decoder, or space for its pictures.
     #[error("{said}")]
     Unable {
         /// The line in which it says so.
         said: String,
     },
-    /// It found another number of frames than ffprobe.
+    /// The program decoded another number of frames than ffprobe counts.
     #[error("decoded {}, ffprobe counts {counted}", count_of(*decoded, "frame"))]
     Frames {
-        /// How many it decoded.
+        /// Number of decoded frames.
         decoded: usize,
-        /// How many ffprobe counts.
+        /// Number of frames that ffprobe counts.
         counted: usize,
     },
-    /// It stopped early, and calls that a success.
-    #[error("made only a part of it: {said}")]
+    /// The program stopped early, and reported success.
+    #[error("wrote only a part of the video: {said}")]
     StoppedEarly {
-        /// What it said.
+        /// What it printed.
         said: String,
     },
-    /// Its answer is of no use.
+    /// The program's answer cannot be used.
     #[error(transparent)]
     Answer(#[from] AnswerProblem),
-    /// A live source cannot be read, or not any more.
+    /// A live source cannot be read, or no longer.
     #[error(transparent)]
     Live(#[from] LiveProblem),
 }
 
-/// Why ffprobe's answer about a video is of no use.
+/// Why ffprobe's answer about a video cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnswerProblem {
-    /// It cannot be read.
-    #[error("answered what cannot be read: {0}")]
+    /// The answer cannot be parsed.
+    #[error("gave an answer that cannot be read: {0}")]
     Unreadable(#[from] serde_json::Error),
-    /// There is no video in the file.
-    #[error("finds no video stream in it")]
+    /// The file has no video stream.
+    #[error("finds no video stream")]
     NoStream,
-    /// It has no size.
-    #[error("does not know the images' size")]
+    /// The video stream has no size.
+    #[error("does not give the images' size")]
     NoSize,
-    /// The video has no frame.
-    #[error("finds no frame in it")]
+    /// The video stream has no frame.
+    #[error("finds no frame")]
     NoFrame,
 }
 
@@ -105,28 +105,28 @@ impl Hint for ProgramProblem {
                  and give their folder"
             }
             Self::NotInstalled(Write) => {
-                "install ffmpeg so that it is on the PATH, or save the pictures and make the video elsewhere"
+                "install ffmpeg so that it is on the PATH, or save the pictures and make the video on another machine"
             }
             Self::NotInstalled(ReadLive) => {
-                "install ffmpeg so that it is on the PATH; it opens cameras and streams"
+                "install ffmpeg so that it is on the PATH: it reads cameras and streams"
             }
-            Self::NotRun(_) => "check that it can be run from a terminal",
+            Self::NotRun(_) => "check that it runs in a terminal",
             Self::Failed { task: Write, .. } => {
-                "see whether the disk is full; a newer ffmpeg may have an encoder for MP4"
+                "check whether the disk is full, or install an ffmpeg with an encoder for MP4"
             }
             Self::Failed { .. } => {
-                "play the file to see whether it is whole; a newer ffmpeg may know its codec"
+                "play the file to check that it is complete, or install a newer ffmpeg that knows its codec"
             }
             Self::Unable { .. } => {
-                "an ffmpeg that decodes the stream, and space on the disk where its pictures are kept, are needed"
+                "install an ffmpeg that decodes the stream, and check that the disk has space for its pictures"
             }
             Self::Frames { .. } => {
-                "part of the video is damaged: write it anew, such as ffmpeg -i OLD -c:v libx264 -crf 12 NEW.mp4"
+                "part of the video is damaged; encode it again, for example with ffmpeg -i OLD -c:v libx264 -crf 12 NEW.mp4"
             }
             Self::StoppedEarly { .. } => {
-                "see whether the disk is full and the pictures can be opened"
+                "check whether the disk is full and the pictures can be opened"
             }
-            Self::Answer(_) => "is it a video, and whole?",
+            Self::Answer(_) => "check that the file is a video and complete",
             Self::Live(problem) => problem.hint(),
         };
         Some(text.to_owned())

@@ -6,23 +6,23 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Longest complaint that is passed on, in characters.
+/// Length to which a program's messages are shortened, in characters.
 const LONGEST: usize = 400;
 
-/// What a program printed.
+/// The output of a program.
 pub(crate) struct Printed {
-    /// On its standard output.
+    /// Its standard output.
     pub(crate) text: Vec<u8>,
-    /// On its standard error, shortened.
+    /// Its standard error, shortened.
     pub(crate) complaint: String,
-    /// Whether it ended as it should.
+    /// Whether it ended successfully.
     pub(crate) succeeded: bool,
 }
 
-/// Runs a program on `file` in a folder, for a task, and gives what it printed on its standard output.
+/// Runs a program on `file` in a folder, for a task, and returns its standard output.
 ///
 /// # Errors
-/// [`Error::Program`] where it is not installed, or fails.
+/// [`Error::Program`] if it is not installed, or fails.
 pub(crate) fn run<S: AsRef<OsStr>>(
     program: &'static str,
     arguments: &[S],
@@ -34,7 +34,7 @@ pub(crate) fn run<S: AsRef<OsStr>>(
 }
 
 impl Printed {
-    /// It, where the program ended as it should.
+    /// The output, if the program ended successfully.
     ///
     /// # Errors
     /// [`Error::Program`].
@@ -56,7 +56,7 @@ impl Printed {
         })
     }
 
-    /// Whether the program failed for not knowing an option. ffmpeg ends with the same code for everything and says which in words.
+    /// Whether the program failed because it does not know an option. ffmpeg's exit code is always the same, so its message is searched.
     fn does_not_know(&self, option: &str) -> bool {
         !self.succeeded && self.complaint.contains(option)
     }
@@ -65,7 +65,7 @@ impl Printed {
 /// Runs a program to its end, whether it succeeds or not, with `input` on its standard input.
 ///
 /// # Errors
-/// [`Error::Program`] where it is not installed.
+/// [`Error::Program`] if it is not installed.
 pub(crate) fn outcome<S: AsRef<OsStr>>(
     program: &'static str,
     arguments: &[S],
@@ -88,10 +88,10 @@ pub(crate) fn outcome<S: AsRef<OsStr>>(
         .map_err(failed)?;
     let pipe = child.stdin.take();
     let output = std::thread::scope(|scope| {
-        // Beside the reading, or each could wait for the other.
+        // On another thread than the reading, or each could wait for the other.
         scope.spawn(move || {
             if let (Some(mut pipe), Some(bytes)) = (pipe, input) {
-                // A program that ends early does not read all of it; how it ended says why.
+                // A program that ends early does not read all of it; its exit status says why.
                 let _ = pipe.write_all(bytes);
             }
         });
@@ -106,7 +106,7 @@ pub(crate) fn outcome<S: AsRef<OsStr>>(
     })
 }
 
-/// Runs ffmpeg with `-fps_mode`, or as before ffmpeg 5.1, where the option had another name.
+/// Runs ffmpeg with `-fps_mode`, or with the option's name from before ffmpeg 5.1.
 ///
 /// # Errors
 /// Those of `run`.

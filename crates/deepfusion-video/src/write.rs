@@ -1,4 +1,4 @@
-//! Pictures to a video file.
+//! Writes pictures as a video file.
 
 use crate::program::{in_either_words, outcome, run};
 use crate::{Error, ProgramProblem, ProgramTask, Result};
@@ -7,25 +7,25 @@ use image::ImageReader;
 use std::ffi::OsStr;
 use std::path::Path;
 
-/// A picture of a video, and for how long it is shown.
+/// A picture of a video, with the time for which it is shown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VideoPicture {
-    /// Its name in the folder of all.
+    /// Its file name in the folder.
     pub file: String,
-    /// Seconds, above 0.
+    /// Duration in seconds, above 0.
     pub seconds: f64,
 }
 
-/// ffmpeg takes a list's times in 25ths of a second, whatever they are: it is given a thousandfold, and sets them back.
+/// ffmpeg rounds the times of a list to 25ths of a second. So it gets a thousand times the durations, and scales them back.
 const FINER: f64 = 1000.0;
 
-/// Makes a video of pictures (PNG) that lie in a folder, with the user's ffmpeg: `name` (`*.mp4`) in the same folder, made
-/// aside and moved there when it is whole. Pictures of other sizes than the first are fitted into its size; each is shown
-/// for its own time. Without a picture there is no video.
+/// Makes a video of pictures (PNG) in a folder, with the user's ffmpeg: `name` (`*.mp4`) in the same folder, written
+/// elsewhere and moved there when it is complete. Pictures whose size differs from the first one's are fitted into its size; each is shown
+/// for its own time. Without pictures no video is written.
 ///
 /// # Errors
-/// [`Error::Program`] where ffmpeg is not installed, or fails at any of the pictures; [`Error::File`] where the folder
-/// cannot be written; [`Error::Picture`] where the first picture is none.
+/// [`Error::Program`] if ffmpeg is not installed, or fails at any of the pictures; [`Error::File`] if the folder
+/// cannot be written; [`Error::Picture`] if the first picture cannot be read.
 pub fn write_video(folder: &Path, pictures: &[VideoPicture], name: &str) -> Result<()> {
     let Some(first) = pictures.first() else {
         return Ok(());
@@ -33,8 +33,8 @@ pub fn write_video(folder: &Path, pictures: &[VideoPicture], name: &str) -> Resu
     let size = picture_size(&folder.join(&first.file))?;
     let path = folder.join(name);
     let failed = |e| Error::file(&path, e);
-    // ffmpeg takes colons and percent signs in names for something else. What it reads and writes is in a folder of its own, of
-    // which the video alone stays.
+    // ffmpeg gives colons and percent signs in names another meaning. So it reads and writes in a temporary folder, of
+    // which only the video is kept.
     let aside = PartialFolder::beside(&path).map_err(failed)?;
     let list = concat_list(pictures, |i, picture| {
         take(&folder.join(&picture.file), aside.path(), i)
@@ -44,7 +44,7 @@ pub fn write_video(folder: &Path, pictures: &[VideoPicture], name: &str) -> Resu
     deepfusion_fs::publish(&aside.path().join(PART), &path).map_err(failed)
 }
 
-/// Width and height of a picture, whatever its name ends in.
+/// Width and height of a picture, whatever the ending of its name.
 fn picture_size(path: &Path) -> Result<(u32, u32)> {
     let failed = |e| Error::file(path, e);
     let reader = ImageReader::open(path).map_err(failed)?;
@@ -55,10 +55,10 @@ fn picture_size(path: &Path) -> Result<(u32, u32)> {
     })
 }
 
-/// Whether ffmpeg can be run at all, to know before hours of work.
+/// Checks that ffmpeg can be run, before hours of work.
 ///
 /// # Errors
-/// [`Error::Program`] where it is not installed.
+/// [`Error::Program`] if it is not installed.
 pub fn can_write_video(path: &Path) -> Result<()> {
     run(
         "ffmpeg",
@@ -72,7 +72,7 @@ pub fn can_write_video(path: &Path) -> Result<()> {
 const LIST: &str = "list";
 const PART: &str = "part";
 
-/// Takes a picture into a folder, and gives the name that it has there.
+/// Puts a picture into a folder, and returns its name there.
 fn take(picture: &Path, folder: &Path, number: usize) -> Result<String> {
     let name = format!("{number:08}.png");
     let path = folder.join(&name);
@@ -84,7 +84,7 @@ fn take(picture: &Path, folder: &Path, number: usize) -> Result<String> {
 }
 
 fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
-    // Encoders of 4:2:0 want even sizes.
+    // Encoders of 4:2:0 need even sizes.
     let [w, h] = [size.0, size.1].map(|s| s.next_multiple_of(2));
     let filter = format!(
         "settb=1/90000,setpts=PTS/{FINER},\
@@ -125,7 +125,7 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
         )
     };
     let done = in_either_words(with)?.succeeded("ffmpeg", (video, ProgramTask::Write))?;
-    // It goes on after a picture that it cannot read, or ends there, and calls both a success.
+    // ffmpeg continues after a picture that it cannot read, or ends there, and reports success in both cases.
     if done.complaint.is_empty() {
         Ok(())
     } else {
@@ -139,8 +139,8 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
     }
 }
 
-/// ffmpeg's list of files, each under the name that `file` gives it; of the last one it would forget the time, were it not
-/// named again.
+/// ffmpeg's list of files, each with the name that `file` returns. The last one is listed twice, as ffmpeg would ignore its
+/// duration otherwise.
 fn concat_list(
     pictures: &[VideoPicture],
     mut file: impl FnMut(usize, &VideoPicture) -> Result<String>,
@@ -154,8 +154,8 @@ fn concat_list(
     Ok(text + &last)
 }
 
-/// How long each frame of a recording is shown, from when they were taken: until the next one, 0.1 s where that is not
-/// known or not later, and no longer than a second.
+/// How long each frame of a recording is shown, from the times of the frames: until the next one, or 0.1 s if that time is not
+/// known or not later; a second at most.
 #[must_use]
 pub fn shown_for(times_s: &[Option<f64>]) -> Vec<f64> {
     const UNKNOWN_S: f64 = 0.1;

@@ -1,4 +1,4 @@
-//! A long stream of packets, which is decoded part by part, beside what ffmpeg makes of it as one file.
+//! A long stream of packets, decoded part by part, compared with ffmpeg's output for one file.
 
 #![allow(
     clippy::unwrap_used,
@@ -11,7 +11,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// More than twice what is decoded together.
+/// More than twice as many as are decoded together.
 const FRAMES: usize = 610;
 
 fn ffmpeg(folder: &Path, arguments: &str) -> bool {
@@ -28,13 +28,13 @@ fn stream(folder: &Path) -> Option<Vec<Vec<u8>>> {
     stream_of(folder, FRAMES, 25, 20)
 }
 
-/// The packets, told apart by the unit that x264 puts in front of each; `None` where ffmpeg has no x264.
+/// The packets, separated at the unit that x264 puts before each; `None` if ffmpeg has no x264.
 fn stream_of(folder: &Path, frames: usize, rate: u32, group: u32) -> Option<Vec<Vec<u8>>> {
     let source = format!("-f lavfi -i testsrc2=size=64x48:rate={rate} -frames:v {frames}");
     let encoder =
         format!("-pix_fmt yuv420p -c:v libx264 -qp 20 -bf 0 -g {group} -x264-params aud=1 s.h264");
     if !ffmpeg(folder, &format!("{source} {encoder}")) {
-        eprintln!("skipped: there is no ffmpeg with libx264");
+        eprintln!("skipped: no ffmpeg with libx264");
         return None;
     }
     let bytes = fs::read(folder.join("s.h264")).unwrap();
@@ -67,7 +67,7 @@ fn parts_are_decoded_as_the_whole() {
     let all = || Ok::<_, Error>(packets.iter().cloned().map(Ok));
     let last = kept.frame(FRAMES as u64 - 1, all).unwrap();
     assert_eq!(last, at.join("kept/0000000609.jpg"));
-    // The frames and what they are of; what they were made from is gone.
+    // The frames and their description; the temporary files are gone.
     assert_eq!(fs::read_dir(at.join("kept")).unwrap().count(), FRAMES + 1);
     fs::create_dir(at.join("whole")).unwrap();
     assert!(ffmpeg(
@@ -79,7 +79,7 @@ fn parts_are_decoded_as_the_whole() {
         let same = at.join("whole").join(file.file_name().unwrap());
         assert!(fs::read(&file).unwrap() == fs::read(same).unwrap(), "{n}");
     }
-    // Kept from then on: no packet is asked for.
+    // The frames are kept from then on: no packet is requested.
     let again = frames(at, "kept", FRAMES);
     let never = || -> Result<std::iter::Empty<Result<Vec<u8>, Error>>, Error> { unreachable!() };
     assert_eq!(
@@ -88,7 +88,7 @@ fn parts_are_decoded_as_the_whole() {
     );
 }
 
-/// ffmpeg guesses a stream's rate from what it says of itself where there are few packets: pictures must not be named by that.
+/// ffmpeg guesses a stream's rate from the stream itself if there are few packets: pictures must not be named by that guess.
 #[test]
 fn a_stream_of_any_rate_may_end_with_a_few_packets() {
     for (rate, count) in [(5, 3), (10, 1), (10, 253), (15, 259), (50, 252)] {
@@ -105,7 +105,7 @@ fn a_stream_of_any_rate_may_end_with_a_few_packets() {
     }
 }
 
-/// A folder that is no whole cache is not decoded into for nothing.
+/// A folder that is not a complete cache is refused before anything is decoded.
 #[test]
 fn what_is_in_the_way_is_said_first() {
     let folder = tempfile::tempdir().unwrap();
@@ -131,7 +131,7 @@ fn the_message_that_is_wrong_is_named_in_any_part() {
         let kept = frames(at, "kept", FRAMES);
         let error = kept.frame(0, || Ok::<_, Error>(packets.iter().cloned().map(Ok)));
         match error.unwrap_err() {
-            // Seven came before the first key frame.
+            // Seven messages came before the first key frame.
             Error::Packet { number, .. } => assert_eq!(number, 7 + wrong as u64),
             other => panic!("{other}"),
         }
@@ -144,7 +144,7 @@ fn the_message_that_is_wrong_is_named_in_any_part() {
         text.contains("message 617: ") && text.contains("611 packets"),
         "{text}"
     );
-    // Nothing is left of any of them.
+    // No temporary files of any of them are left.
     let left = fs::read_dir(at).unwrap().map(|e| e.unwrap().file_name());
     assert_eq!(left.collect::<Vec<_>>(), ["s.h264"]);
 }

@@ -21,10 +21,10 @@ pub fn in_options(diagnosis: Diagnosis) -> Diagnosis {
 fn what(reason: &FindingReason) -> Option<&'static str> {
     match reason {
         FindingReason::Log(LogReason::NoTurns) => Some(
-            "nothing says how the vehicle turned: --view-motion vehicle cannot train, and --clock-offset auto has changes of speed alone to go by",
+            "no turns were recorded: --view-motion vehicle cannot train, and --clock-offset auto uses changes of speed alone",
         ),
         FindingReason::Log(LogReason::CourseAlone) => Some(
-            "turns are known from positions alone: enough for --clock-offset auto on a few minutes with bends, not for --view-motion vehicle",
+            "turns are known from positions alone: enough for --clock-offset auto over a few minutes with bends, but not for --view-motion vehicle",
         ),
         _ => None,
     }
@@ -35,8 +35,8 @@ fn hint(reason: &FindingReason) -> Option<String> {
     match reason {
         FindingReason::Log(reason) => of_log(reason),
         FindingReason::Motion(MotionReason::ClockOffset { camera_ahead_s, .. }) => Some(format!(
-            "clock.camera_ahead_s = {camera_ahead_s:.3} in dataset.toml or the TOML file beside a bag, or a clock offset of {:.0} ms given (--clock-offset auto measures it \
-             again on opening). Better: one clock for all (PTP, trigger)",
+            "set clock.camera_ahead_s = {camera_ahead_s:.3} in dataset.toml or the TOML file beside a bag, or give a clock offset of {:.0} ms (--clock-offset auto measures it \
+             again on opening); better, use one clock for all sensors (PTP, trigger)",
             1e3 * camera_ahead_s
         )),
         _ => None,
@@ -44,10 +44,11 @@ fn hint(reason: &FindingReason) -> Option<String> {
 }
 
 fn of_log(reason: &LogReason) -> Option<String> {
-    const AUTO: &str = "data import --clock-offset auto measures what is left between the clocks";
+    const AUTO: &str =
+        "data import --clock-offset auto measures what remains of the clocks' offset";
     Some(match reason {
         LogReason::NoSpeed(_) => {
-            "switch the camera's GPS on and wait for its fix; or bring another log: deepfusion data import LOG --video FILE --out DRIVE".into()
+            "switch on the camera's GPS and wait for a fix, or import another log: deepfusion data import LOG --video FILE --out DRIVE".into()
         }
         LogReason::Unreadable(error) => match error.error() {
             Error::Signal { .. } => "give --dbc FILE and --speed Message.Signal".into(),
@@ -57,7 +58,7 @@ fn of_log(reason: &LogReason) -> Option<String> {
             }
             _ => return None,
         },
-        LogReason::TooFast { .. } => "say the unit: --unit km/h (m/s, mph, knots)".into(),
+        LogReason::TooFast { .. } => "give the unit of speed: --unit km/h (m/s, mph, knots)".into(),
         LogReason::Unsure { .. } => {
             "drive faster or longer, or log the vehicle's own speed: OBD, CAN (--dbc FILE --speed Message.Signal)".into()
         }
@@ -69,10 +70,10 @@ fn of_log(reason: &LogReason) -> Option<String> {
             if *format == Format::Gpmf { "" } else { " --video FILE" }
         ),
         LogReason::NoTurns | LogReason::CourseAlone => {
-            "--view-motion posenet or distance need no turns; a second log with a gyroscope brings them: deepfusion data import LOG GYROSCOPE …".into()
+            "use --view-motion posenet or distance, which need no turns, or add a second log with a gyroscope: deepfusion data import LOG GYROSCOPE …".into()
         }
         LogReason::LocalDates => format!("deepfusion data import … --zone +02:00; {AUTO}"),
-        LogReason::NoDates => format!("deepfusion data import … --start TIME says it; {AUTO}"),
+        LogReason::NoDates => format!("deepfusion data import … --start TIME gives it; {AUTO}"),
         LogReason::Dates => AUTO.into(),
         _ => return None,
     })

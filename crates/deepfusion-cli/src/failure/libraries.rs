@@ -160,7 +160,9 @@ impl Reportable for deepfusion_logs::Error {
 impl Reportable for deepfusion_video::Error {
     fn hint_in_options(&self) -> Option<String> {
         match self {
-            Self::Silent { .. } => Some("is the source sending? --timeout S waits longer".into()),
+            Self::Silent { .. } => {
+                Some("check that the source is sending, or set a longer --timeout S".into())
+            }
             _ => self.hint(),
         }
     }

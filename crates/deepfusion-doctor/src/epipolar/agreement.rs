@@ -1,4 +1,4 @@
-//! How well a pair's points agree with a turn that is given: what decides between times of the vehicle's clock.
+//! How well a pair's points agree with a given turn. This decides between offsets of the vehicle's clock.
 
 use super::pitching::USUAL_PITCH;
 use super::{EpipolarPair, ROUNDS, along, headed_past, turning};
@@ -6,10 +6,10 @@ use nalgebra::{Vector2, Vector3};
 
 impl EpipolarPair {
     /// Sum of the points' robust costs, ½ ln(1 + (residual / noise)²), across their epipolar lines if the camera turned as
-    /// the vehicle says and moved along `direction` but for a pitch of the moment, which is found.
+    /// the vehicle measured and moved along `direction`, except for a momentary pitch, which is estimated.
     pub(crate) fn cost_of_the_vehicle_s_turn(&self, direction: &Vector3<f64>) -> f64 {
         let omega = self.earlier_from_later.axis_angle();
-        // What is left across a line, and what a pitch of one radian would add to it.
+        // The residual across a line, and what a pitch of one radian would add to it.
         let rows: Vec<(f64, f64)> = self
             .points
             .iter()

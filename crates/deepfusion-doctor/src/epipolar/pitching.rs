@@ -1,26 +1,26 @@
-//! How a camera turned whose nose goes up and down.
+//! How a camera turned while its vehicle pitched.
 //!
-//! A car that pitches by δ heads δ off what the mount says. Near points, which move far, then leave their epipolar lines as if
-//! the camera turned: a part of the angle δ comes beside its rate, and the measured oscillation is late, by up to 50 ms.
-//! So δ is found with the turn. With a from the point headed for to a point, it turns that point's epipolar line by
-//! δ·a.x/|a|, and the movement along the line shows across it by as much.
+//! A car that pitches by δ heads δ off the direction that the mount gives. Near points, which move far, then leave their epipolar
+//! lines as if the camera turned: a part of the angle δ is added to its rate, and the measured oscillation is late, by up to 50 ms.
+//! So δ is estimated with the turn. With a from the point headed for to a point, it turns that point's epipolar line by
+//! δ·a.x/|a|, and the movement along the line shows across it in the same proportion.
 
 use super::{EpipolarPair, ROUNDS, USUAL_TILT, along, headed_past, turning};
 use nalgebra::{Matrix4, Vector2, Vector3, Vector4};
 
-/// How far a car's nose is usually up or down, radians.
+/// Usual pitch of a car, radians.
 pub(super) const USUAL_PITCH: f64 = 0.02;
 
 impl EpipolarPair {
-    /// The camera's turn by its points, radians about its axes, if it moved along `direction` but for a pitch of the moment.
-    /// `None` where they determine none.
+    /// The camera's turn according to its points, radians about its axes, if it moved along `direction` except for a momentary pitch.
+    /// `None` if they do not determine one.
     pub(crate) fn turn_of_a_pitching_body(&self, direction: &Vector3<f64>) -> Option<Vector3<f64>> {
         let said = self.earlier_from_later.axis_angle();
         let [tilt, pitch] = [USUAL_TILT, USUAL_PITCH].map(|usual| 1.0 / usual.powi(2));
         let hold = Vector4::new(tilt, 0.0, tilt, pitch);
         let start = said.push(0.0);
         let mut found = start;
-        // The movement along a line is what the turn leaves, so that rounds depend on each other.
+        // The movement along a line is what remains without the turn, so each round depends on the one before.
         for _ in 0..2 * ROUNDS {
             let mut m = Matrix4::from_diagonal(&hold);
             let mut y = hold.component_mul(&start);

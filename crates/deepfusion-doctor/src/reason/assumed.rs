@@ -1,12 +1,11 @@
-//! What to do about what was assumed on opening a recording: which key says otherwise, and in which file.
+//! What to do about what was assumed on opening a recording: which key changes it, and in which file.
 
 use deepfusion_data::{
     CameraWarning, DataWarning, IncompleteWarning, MotionWarning, MountWarning, TimesWarning,
 };
 
-/// Where nothing better is known.
-const SEE: &str =
-    "see that it is so; dataset.toml, or the TOML file beside a bag, has keys for what is not";
+/// The hint if there is no better one.
+const SEE: &str = "check that this is right; if not, set the key for it in dataset.toml, or in the TOML file beside a bag";
 
 /// What to do.
 pub(super) fn hint(warning: &DataWarning) -> &'static str {
@@ -17,7 +16,7 @@ pub(super) fn hint(warning: &DataWarning) -> &'static str {
         DataWarning::Motion(warning) => of_motion(warning),
         DataWarning::Incomplete(warning) => of_what_is_missing(warning),
         DataWarning::FramesElsewhere { .. } => {
-            "nothing has to be done; a folder of your own, whose dataset.toml names the video, may have the key cache for another place"
+            "nothing to do; to keep the images elsewhere, name the video in the dataset.toml of a folder of your own, and set the key cache there"
         }
         _ => SEE,
     }
@@ -26,16 +25,16 @@ pub(super) fn hint(warning: &DataWarning) -> &'static str {
 fn of_camera(warning: &CameraWarning) -> &'static str {
     match warning {
         CameraWarning::SizeUnknown { .. } => {
-            "see that it was measured with images of this size; intrinsics in dataset.toml, or a calibration.yaml, says another"
+            "check that it was measured on images of this size; if not, set intrinsics in dataset.toml, or add a calibration.yaml"
         }
         CameraWarning::LensCorrected => {
-            "nothing is to be done; intrinsics in dataset.toml takes the images as they are"
+            "nothing to do; to use the images as they are, set intrinsics in dataset.toml"
         }
         CameraWarning::BendsLines { .. } => {
-            "name a calibration with the lens: calibration in dataset.toml"
+            "name a calibration that includes the lens as calibration in dataset.toml"
         }
         _ => {
-            "calibrate the camera, or say it: intrinsics or hfov_deg in dataset.toml, [camera] in the TOML file beside a bag"
+            "calibrate the camera, or set intrinsics or hfov_deg in dataset.toml, or [camera] in the TOML file beside a bag"
         }
     }
 }
@@ -43,21 +42,21 @@ fn of_camera(warning: &CameraWarning) -> &'static str {
 fn of_mount(warning: &MountWarning) -> &'static str {
     match warning {
         MountWarning::NotGiven | MountWarning::Aimed(_) => {
-            "measure it, and say it in dataset.toml: forward_m, left_m, up_m, yaw_deg, pitch_deg, roll_deg under [mount]"
+            "measure it, and set forward_m, left_m, up_m, yaw_deg, pitch_deg and roll_deg in dataset.toml, under [mount]"
         }
         MountWarning::CameraUnknown => {
-            "measure it, and say it as cam_from_vehicle in the TOML file beside the bag"
+            "measure it, and set cam_from_vehicle in the TOML file beside the bag"
         }
         MountWarning::LidarUnknown => {
-            "measure it, and say it as cam_from_lidar in the TOML file beside the bag"
+            "measure it, and set cam_from_lidar in the TOML file beside the bag"
         }
         MountWarning::BodyAxes { .. } => {
-            "see that it is so; frames.camera or cam_from_vehicle in the TOML file beside the bag says otherwise"
+            "check that this is right; if not, set frames.camera or cam_from_vehicle in the TOML file beside the bag"
         }
         MountWarning::BrokenTransforms { .. }
         | MountWarning::NotByFrames { .. }
         | MountWarning::Apart { .. } => {
-            "see which is right; cam_from_vehicle, cam_from_lidar and vehicle_from_imu in the TOML file beside the bag come before its frames"
+            "check which is right; cam_from_vehicle, cam_from_lidar and vehicle_from_imu in the TOML file beside the bag override its frames"
         }
         _ => SEE,
     }
@@ -67,49 +66,49 @@ fn of_times(warning: &TimesWarning) -> &'static str {
     match warning {
         TimesWarning::ImagesUntimed | TimesWarning::VideoUntimed => "set fps in dataset.toml",
         TimesWarning::ImagesByName { .. } | TimesWarning::NoUnit { .. } => {
-            "see that it is so; time_unit in dataset.toml says otherwise"
+            "check that this is right; if not, set time_unit in dataset.toml"
         }
         TimesWarning::Repeated { .. } | TimesWarning::OtherCount { .. } => {
-            "see whether the files are whole"
+            "check that the files are complete"
         }
         TimesWarning::Unstamped { .. } => {
-            "clock.camera_ahead_s in the TOML file beside the bag takes a constant delay out"
+            "to remove a constant delay, set clock.camera_ahead_s in the TOML file beside the bag"
         }
-        _ => "see that it is so; start_s in dataset.toml says otherwise",
+        _ => "check that this is right; if not, set start_s in dataset.toml",
     }
 }
 
 fn of_motion(warning: &MotionWarning) -> &'static str {
     match warning {
         MotionWarning::FramesWithoutSpeed { .. } => {
-            "see whether the speeds are on the images' clock; start_s in dataset.toml, or clock.camera_ahead_s, moves the images"
+            "check that the speeds are on the images' clock; if not, shift the images with start_s in dataset.toml, or clock.camera_ahead_s"
         }
         MotionWarning::NoYawRate { .. } => {
-            "record an inertial unit or the steering angle; imu in dataset.toml names a table of yaw rates"
+            "record an inertial unit or the steering angle, or name a table of yaw rates as imu in dataset.toml"
         }
         MotionWarning::YawNotMeasured => {
-            "record an inertial unit; yaw_known in dataset.toml says that there was one"
+            "record an inertial unit; if there was one, set yaw_known in dataset.toml"
         }
         MotionWarning::Understood { .. } => {
-            "see that it is so; speed_column, speed_unit, time_column and time_unit in dataset.toml say otherwise"
+            "check that this is right; if not, set speed_column, speed_unit, time_column or time_unit in dataset.toml"
         }
         MotionWarning::NoCourseRates | MotionWarning::CourseNotRead { .. } => {
-            "write course.csv anew, or remove it"
+            "write course.csv again, or remove it"
         }
         MotionWarning::Bridged { .. } | MotionWarning::NotBridged { .. } => {
-            "see that the vehicle did not stop in between; max_gap_s says otherwise: in dataset.toml, or under [vehicle] in the TOML file beside a bag"
+            "check that the vehicle did not stop in between; if it did, set max_gap_s in dataset.toml, or under [vehicle] in the TOML file beside a bag"
         }
         MotionWarning::SegmentWithoutTurns | MotionWarning::TurnsOfImages { .. } => {
             "record an inertial unit or the steering angle"
         }
         MotionWarning::NoRates { .. } => {
-            "topics.imu in the TOML file beside the bag names another inertial unit"
+            "to use another inertial unit, set topics.imu in the TOML file beside the bag"
         }
         MotionWarning::BeyondRange { .. } | MotionWarning::SilentSignal { .. } => {
-            "see that the signal is the right one; the key is under [can] in the TOML file beside the bag"
+            "check that the signal is the right one; if not, change the key under [can] in the TOML file beside the bag"
         }
         _ => {
-            "see that it is so; topics.speed, or topics.steering, in the TOML file beside the bag names another topic"
+            "check that this is right; if not, set topics.speed, or topics.steering, in the TOML file beside the bag"
         }
     }
 }
@@ -119,13 +118,13 @@ fn of_what_is_missing(warning: &IncompleteWarning) -> &'static str {
         IncompleteWarning::Damaged(_) | IncompleteWarning::Unreadable { .. } => {
             "copy the bag again; `rosbag reindex` (`ros2 bag reindex`) repairs one whose recording was cut off"
         }
-        IncompleteWarning::PassedOver { .. } => "give what is to be read as well by its own path",
+        IncompleteWarning::PassedOver { .. } => "to read them too, give their own paths",
         IncompleteWarning::NoImages { .. } | IncompleteWarning::ImagesMissing { .. } => {
             "fetch or unpack the images that are missing"
         }
         IncompleteWarning::ImagesUnlisted { .. } => "add the images to the table, or remove them",
         IncompleteWarning::BeforeKeyFrame { .. } => {
-            "nothing can be done now; record from a key frame on"
+            "nothing to do for this recording; start the next one at a key frame"
         }
         _ => SEE,
     }

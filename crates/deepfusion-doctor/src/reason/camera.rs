@@ -1,77 +1,77 @@
-//! What is wrong with a camera's numbers, and with its place on the vehicle.
+//! What is wrong with a camera's intrinsics, and with its mount on the vehicle.
 
 use crate::shared_error::SharedError;
 use deepfusion_data::Error;
 use deepfusion_hint::Hint;
 use std::fmt;
 
-/// What is wrong with a camera's numbers, and with its place on the vehicle.
+/// What is wrong with a camera's intrinsics, and with its mount on the vehicle.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraReason {
-    /// The focal length is no car's camera's.
+    /// The focal length is not that of a camera on a car.
     #[error(
-        "fx {fx:.1} px sees {view_deg:.0} degrees of {width} pixels, which no camera on a car does: depths would be wrong by the same factor"
+        "fx {fx:.1} px gives a field of view of {view_deg:.0} degrees at a width of {width} pixels, unlike any camera on a car: depths would be wrong by the same factor"
     )]
     View {
         /// Focal length along x, pixels.
         fx: f64,
-        /// How much the image is wide by it, degrees.
+        /// Horizontal field of view with this focal length, degrees.
         view_deg: f64,
-        /// Its width, pixels.
+        /// Width of the images, pixels.
         width: u32,
     },
     /// The two focal lengths differ.
-    #[error("fx {fx:.1} and fy {fy:.1} px differ more than pixels do")]
+    #[error("fx {fx:.1} px and fy {fy:.1} px differ by more than the shape of pixels explains")]
     PixelShape {
         /// Focal length along x, pixels.
         fx: f64,
         /// Focal length along y, pixels.
         fy: f64,
     },
-    /// The principal point is that of images of another size.
+    /// The principal point belongs to images of another size.
     #[error(
-        "{coordinate} {value:.1} is far from the middle of {size} pixels: these are the numbers of an image of about {}x{}, not of {}x{}",
+        "{coordinate} {value:.1} is far from the middle of {size} pixels: the intrinsics fit images of about {}x{}, not {}x{}",
         other[0], other[1], image[0], image[1]
     )]
     OtherSize {
-        /// Which coordinate of it.
+        /// Coordinate of the principal point.
         coordinate: CentreCoordinate,
         /// Its value, pixels.
         value: f64,
-        /// How large the image is along it, pixels.
+        /// Size of the image along this coordinate, pixels.
         size: u32,
-        /// Width and height that it fits.
+        /// Width and height that the principal point fits.
         other: [u32; 2],
         /// Width and height of the images.
         image: [u32; 2],
     },
     /// The principal point is far from the middle.
     #[error(
-        "{coordinate} {value:.1} is far from the middle of {size} pixels: only a cut-out image has it there"
+        "{coordinate} {value:.1} is far from the middle of {size} pixels: only a cropped image has it there"
     )]
     OffCentre {
-        /// Which coordinate of it.
+        /// Coordinate of the principal point.
         coordinate: CentreCoordinate,
         /// Its value, pixels.
         value: f64,
-        /// How large the image is along it, pixels.
+        /// Size of the image along this coordinate, pixels.
         size: u32,
     },
-    /// The camera does not head where its mount says.
+    /// The camera does not move in the direction that its mount gives.
     #[error(
         "driving straight, the camera heads {:.1} ± {std_error_deg:.1} degrees further {} than its mount says",
         off_deg.abs(),
         angle.side(*off_deg)
     )]
     Heading {
-        /// About which axis.
+        /// Angle that is off.
         angle: HeadingAngle,
-        /// By how much, degrees: up and to the right are positive.
+        /// Difference from the mount, degrees: up and to the right are positive.
         off_deg: f64,
         /// The standard error of that, degrees.
         std_error_deg: f64,
-        /// By how much the principal point is off, pixels, if the mount is right.
+        /// Error of the principal point, pixels, if the mount is right.
         centre_by_px: f64,
     },
     /// The measured depth of a frame cannot be read.
@@ -83,24 +83,24 @@ pub enum CameraReason {
         camera_by_deg.abs()
     )]
     RoadTurned {
-        /// Frames that show it.
+        /// Number of frames that show the road.
         frames: usize,
-        /// By how much the camera is turned against its mount, if the LiDAR is where it is said to be: further down, or clockwise as it looks,
+        /// Rotation of the camera from its mount, if the LiDAR's mount is right: further down, or clockwise seen along its view,
         /// degrees.
         camera_by_deg: f64,
-        /// About which axis.
+        /// Angle that is off.
         angle: RoadAngle,
     },
-    /// The measured depth puts the camera where no car has it.
+    /// The measured depth gives a height that no car's camera has.
     #[error(
         "the measured depth puts the camera {height_m:.2} m above the road, where no car has it"
     )]
     Height {
-        /// How high above the road, metres.
+        /// Height of the camera above the road, metres.
         height_m: f64,
     },
     /// The two cameras are the wrong way round.
-    #[error("what camera 2 sees lies further right in camera 3: the two are swapped")]
+    #[error("points lie further right in camera 3 than in camera 2: the cameras are swapped")]
     Swapped,
 }
 
@@ -109,21 +109,21 @@ impl CameraReason {
     pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::View { .. } => {
-                "calibrate at the size of these images; a focal length in millimetres has to be divided by the size of a pixel"
+                "calibrate at this image size; divide a focal length in millimetres by the size of a pixel"
             }
             Self::PixelShape { .. } => {
-                "where the images were resized, scale fx by the new width over the old, fy by the heights"
+                "if the images were resized, multiply fx by new width / old width, and fy by new height / old height"
             }
             Self::OtherSize { other, image, .. } => {
                 let times = |axis: usize| f64::from(image[axis]) / f64::from(other[axis]);
                 return format!(
-                    "give the matrix of the images' own size: fx and cx times {:.4}, fy and cy times {:.4}",
+                    "scale the matrix to the images' own size: multiply fx and cx by {:.4}, fy and cy by {:.4}",
                     times(0),
                     times(1)
                 );
             }
             Self::OffCentre { .. } => {
-                "look it up again; where the images were cut, subtract the cut from cx and cy, else calibrate anew"
+                "check the value; if the images were cropped, subtract the crop's offset from cx and cy, otherwise calibrate again"
             }
             Self::Heading {
                 angle,
@@ -156,9 +156,9 @@ impl CameraReason {
                 );
             }
             Self::Height { .. } => {
-                "see the unit of the depth (metres, millimetres, 1/256 m) and the LiDAR's place on the camera"
+                "check the unit of the depth (metres, millimetres, 1/256 m) and the LiDAR's pose relative to the camera"
             }
-            Self::Swapped => "rename image_02 to image_03 and the other way round",
+            Self::Swapped => "swap the folders image_02 and image_03",
         };
         text.to_owned()
     }
@@ -167,9 +167,9 @@ impl CameraReason {
 /// A coordinate of the principal point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CentreCoordinate {
-    /// Along x.
+    /// The coordinate along x.
     Cx,
-    /// Along y.
+    /// The coordinate along y.
     Cy,
 }
 
@@ -182,7 +182,7 @@ impl fmt::Display for CentreCoordinate {
     }
 }
 
-/// An angle between where a camera looks and where it goes.
+/// An angle between a camera's direction of view and its direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeadingAngle {
     /// Up and down.
@@ -192,7 +192,7 @@ pub enum HeadingAngle {
 }
 
 impl HeadingAngle {
-    /// The coordinate of the principal point that looks the same where it is off.
+    /// The coordinate of the principal point whose error has the same effect.
     fn coordinate(self) -> CentreCoordinate {
         match self {
             Self::Pitch => CentreCoordinate::Cy,
@@ -200,7 +200,7 @@ impl HeadingAngle {
         }
     }
 
-    /// Where something is that is off by so much: up and to the right are positive.
+    /// The side of a deviation: up and to the right are positive.
     fn side(self, off: f64) -> &'static str {
         match (self, off > 0.0) {
             (Self::Pitch, true) => "up",
@@ -220,12 +220,12 @@ impl fmt::Display for HeadingAngle {
     }
 }
 
-/// An angle between the road and what a mount says of it.
+/// An angle between the measured road and the road according to a mount.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RoadAngle {
-    /// Along the way ahead.
+    /// Slope in the direction of travel.
     Pitch,
-    /// Across it.
+    /// Slope across it.
     Roll,
 }
 
@@ -251,14 +251,14 @@ mod tests {
                     view_deg: 177.6,
                     width: 640,
                 },
-                "fx 7.2 px sees 178 degrees of 640 pixels, which no camera on a car does: depths would be wrong by the same factor",
+                "fx 7.2 px gives a field of view of 178 degrees at a width of 640 pixels, unlike any camera on a car: depths would be wrong by the same factor",
             ),
             (
                 CameraReason::PixelShape {
                     fx: 700.0,
                     fy: 400.0,
                 },
-                "fx 700.0 and fy 400.0 px differ more than pixels do",
+                "fx 700.0 px and fy 400.0 px differ by more than the shape of pixels explains",
             ),
             (
                 CameraReason::OtherSize {
@@ -268,7 +268,7 @@ mod tests {
                     other: [1242, 375],
                     image: [640, 192],
                 },
-                "cx 609.6 is far from the middle of 640 pixels: these are the numbers of an image of about 1242x375, not of 640x192",
+                "cx 609.6 is far from the middle of 640 pixels: the intrinsics fit images of about 1242x375, not 640x192",
             ),
             (
                 CameraReason::OffCentre {
@@ -276,7 +276,7 @@ mod tests {
                     value: 117.6,
                     size: 480,
                 },
-                "cy 117.6 is far from the middle of 480 pixels: only a cut-out image has it there",
+                "cy 117.6 is far from the middle of 480 pixels: only a cropped image has it there",
             ),
         ] {
             assert_eq!(reason.to_string(), said);
@@ -329,7 +329,7 @@ mod tests {
         for (reason, hint) in [
             (
                 of_another_size,
-                "give the matrix of the images' own size: fx and cx times 0.5153, fy and cy times 0.5120",
+                "scale the matrix to the images' own size: multiply fx and cx by 0.5153, fy and cy by 0.5120",
             ),
             (
                 heading(HeadingAngle::Yaw, 12.3),

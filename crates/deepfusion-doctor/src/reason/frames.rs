@@ -1,15 +1,15 @@
-//! What is wrong with when frames were taken, and with whether the vehicle moved.
+//! What is wrong with the frames' times, and with whether the vehicle moved.
 
 use deepfusion_hint::count_of;
 
-/// What is wrong with when frames were taken, and with whether the vehicle moved.
+/// What is wrong with the frames' times, and with whether the vehicle moved.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FramesReason {
     /// A frame was taken before the one before it.
-    #[error("its time stamp is {by_s:.3} s before the frame before")]
+    #[error("its time stamp is {by_s:.3} s earlier than that of the frame before")]
     Backwards {
-        /// By how much, seconds.
+        /// Time between the two, seconds.
         by_s: f64,
     },
     /// Frames are missing.
@@ -19,50 +19,50 @@ pub enum FramesReason {
         if *lost == 1 { "is" } else { "are" }
     )]
     Lost {
-        /// How many.
+        /// Number of missing frames.
         lost: usize,
         /// The camera's usual rate, 1/s.
         rate_hz: f64,
         /// The number of the first frame that has a gap before it.
         first: u64,
     },
-    /// At times the vehicle's motion is not known.
+    /// The vehicle's motion is unknown at some times.
     #[error(
         "the vehicle's motion is unknown for {unknown_s:.1} s in {}, the first from frame {first}: its speed has gaps there, and no pair of these frames can train",
         count_of(*stretches, "stretch")
     )]
     UnknownMotion {
-        /// For how long, seconds.
+        /// Total time without a motion, seconds.
         unknown_s: f64,
-        /// In how many stretches.
+        /// Number of stretches without a motion.
         stretches: usize,
-        /// The number of the frame from which the first is.
+        /// The number of the first frame of the first stretch.
         first: u64,
     },
     /// The log of speeds does not cover all images.
     #[error("the speeds {}: frames beyond them cannot train", beside(*before_s, *after_s))]
     BesideLog {
-        /// For how long the images are without it at their beginning, seconds.
+        /// Time from the first image to the first speed, seconds.
         before_s: f64,
-        /// And at their end.
+        /// Time from the last speed to the last image, seconds.
         after_s: f64,
     },
-    /// Frames are the frame before once more.
+    /// Frames repeat the frame before.
     #[error(
-        "{repeated} of {} {} the frame before once more while the vehicle moves, the first of them frame {first}: {} teaches that everything is infinitely far",
+        "{repeated} of {} {} the frame before while the vehicle moves, the first of them frame {first}: training on {} teaches that everything is infinitely far",
         count_of(*frames, "frame"),
-        if *repeated == 1 { "is" } else { "are" },
-        if *repeated == 1 { "it" } else { "each of them" }
+        if *repeated == 1 { "repeats" } else { "repeat" },
+        if *repeated == 1 { "it" } else { "them" }
     )]
     Repeated {
-        /// How many.
+        /// Number of repeated frames.
         repeated: usize,
-        /// Of how many that were compared.
+        /// Number of frames that were compared.
         frames: u32,
-        /// The number of the first.
+        /// The number of the first repeated frame.
         first: u64,
     },
-    /// Much of the drive stands.
+    /// The vehicle stands in much of the drive.
     #[error(
         "the vehicle stands in {standing} of {pairs} pairs, longest in frames {from} to {to}: they show no parallax and are left out of training"
     )]
@@ -73,7 +73,7 @@ pub enum FramesReason {
         pairs: usize,
         /// The first frame of the longest stretch.
         from: u64,
-        /// Its last one.
+        /// The last frame of the longest stretch.
         to: u64,
     },
 }
@@ -90,20 +90,19 @@ impl FramesReason {
                 "find out where the recorder drops messages of the speed, or cut the recording there"
             }
             Self::BesideLog { .. } => {
-                "start the log before the camera and stop it after; if it was so, the clocks differ: start_s in dataset.toml, or clock.camera_ahead_s, \
-                 moves the images"
+                "start the log before the camera and stop it after; if you did, the clocks differ: shift the images with start_s in dataset.toml, or clock.camera_ahead_s"
             }
             Self::Repeated { .. } => {
-                "record at the camera's own rate, and remove the repeated frames (time stamps and all)"
+                "record at the camera's own rate, and remove the repeated frames with their time stamps"
             }
             Self::Standing { .. } => {
-                "cut the standing parts out, or see whether the speed signal drops out"
+                "cut out the parts where the vehicle stands, or check whether the speed signal drops out"
             }
         }
     }
 }
 
-/// Where speeds begin and end within the images.
+/// Says by how much the speeds begin after the first image and end before the last.
 fn beside(before_s: f64, after_s: f64) -> String {
     let begin = format!("begin {before_s:.1} s after the first image");
     let end = format!("end {after_s:.1} s before the last");
@@ -133,7 +132,7 @@ mod tests {
         for (reason, said) in [
             (
                 FramesReason::Backwards { by_s: 0.1 },
-                "its time stamp is 0.100 s before the frame before",
+                "its time stamp is 0.100 s earlier than that of the frame before",
             ),
             (
                 lost(1),
@@ -184,13 +183,11 @@ mod tests {
         for (reason, said) in [
             (
                 repeated(1),
-                "1 of 9 frames is the frame before once more while the vehicle moves, the first of them frame 5: it teaches that everything \
-                 is infinitely far",
+                "1 of 9 frames repeats the frame before while the vehicle moves, the first of them frame 5: training on it teaches that everything is infinitely far",
             ),
             (
                 repeated(3),
-                "3 of 9 frames are the frame before once more while the vehicle moves, the first of them frame 5: each of them teaches that \
-                 everything is infinitely far",
+                "3 of 9 frames repeat the frame before while the vehicle moves, the first of them frame 5: training on them teaches that everything is infinitely far",
             ),
             (
                 FramesReason::Standing {

@@ -1,21 +1,21 @@
-//! What is wrong with a log of speeds by itself, or is to be known of it.
+//! What is wrong with a log of speeds on its own, or has to be known about it.
 
 use crate::shared_error::SharedError;
 use deepfusion_hint::{Hint, count_of};
 use deepfusion_logs::{Error, Format, LogNote, NoGps};
 use std::path::PathBuf;
 
-/// What is wrong with a log of speeds by itself, or is to be known of it.
+/// What is wrong with a log of speeds on its own, or has to be known about it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogReason {
-    /// It cannot be read.
+    /// The log cannot be read.
     #[error(transparent)]
     Unreadable(SharedError<Error>),
     /// The track within a camera's video has no speed.
     #[error("the camera's own log has no speed: {0}")]
     NoSpeed(NoGps),
-    /// What it holds.
+    /// What the log holds.
     #[error(
         "{format} with {} and {}: {}",
         count_of(*speeds, "speed"),
@@ -23,36 +23,36 @@ pub enum LogReason {
         together(notes)
     )]
     Holds {
-        /// The log.
+        /// Path of the log.
         log: PathBuf,
-        /// What kind of log it is.
+        /// Format of the log.
         format: Format,
-        /// How many speeds it has.
+        /// Number of speeds.
         speeds: usize,
-        /// How many yaw rates.
+        /// Number of yaw rates.
         yaw_rates: usize,
-        /// How it was understood.
+        /// How its columns and values were interpreted.
         notes: Vec<LogNote>,
     },
-    /// Its speeds are far apart in time.
+    /// The speeds are far apart in time.
     #[error("a speed every {every_s:.1} s: starts and stops lie between them")]
     Sparse {
-        /// How far, seconds.
+        /// Time between two speeds, seconds.
         every_s: f64,
     },
-    /// At a time it has no speeds.
-    #[error("{longest_s:.1} s without a speed: frames of that time are not used")]
+    /// The log has a gap in its speeds.
+    #[error("{longest_s:.1} s without a speed: frames in that time are not used")]
     Gap {
-        /// For how long at most, seconds.
+        /// Length of the longest gap, seconds.
         longest_s: f64,
     },
-    /// No road vehicle is as fast.
+    /// A speed is higher than a road vehicle's.
     #[error(
-        "{fastest_mps:.0} m/s are {:.0} km/h: the unit is another one, and every depth would be scaled by it",
+        "{fastest_mps:.0} m/s is {:.0} km/h: the unit is wrong, and every depth would be wrong by the same factor",
         3.6 * fastest_mps
     )]
     TooFast {
-        /// Its highest speed, m/s.
+        /// The highest speed, m/s.
         fastest_mps: f64,
     },
     /// The vehicle stands most of the time.
@@ -60,38 +60,38 @@ pub enum LogReason {
         "the vehicle moves in {moving_percent:.0} % of the log: nothing is learned from the rest"
     )]
     Standing {
-        /// How much of the time it moves.
+        /// Share of the time in which it moves, percent.
         moving_percent: f64,
     },
-    /// Its speeds are unsure.
+    /// The speeds are uncertain.
     #[error(
-        "expect distances, and with them a short drive's scale, within ±{sigma_percent:.0} %: such pairs weigh less in training, above 20 % nothing"
+        "distances, and with them a short drive's scale, are accurate to ±{sigma_percent:.0} %: such pairs get less weight in training, and none above 20 %"
     )]
     Unsure {
-        /// A speed's standard deviation, of the speed.
+        /// Standard deviation of a speed, percent of the speed.
         sigma_percent: f64,
     },
-    /// Positions alone say how the vehicle turned.
+    /// Turns are known from positions alone.
     #[error(
-        "turns are known from positions alone: enough to compare the clocks on a few minutes with bends, not for the vehicle's own poses"
+        "turns are known from positions alone: enough to compare the clocks over a few minutes with bends, but not for the vehicle's own poses"
     )]
     CourseAlone,
-    /// Nothing says how the vehicle turned.
+    /// No turns were recorded.
     #[error(
-        "nothing says how the vehicle turned: the vehicle's own poses cannot train, and clocks are compared by changes of speed alone"
+        "no turns were recorded: training cannot use the vehicle's own poses, and clocks are compared by changes of speed alone"
     )]
     NoTurns,
-    /// Its times are dates.
+    /// The times are dates in UTC.
     #[error(
-        "dates in UTC: the video begins when its recorder says that it was made, to a second or so"
+        "the times are dates in UTC: the video's start is the creation time that its recorder wrote, accurate to a second or so"
     )]
     Dates,
-    /// Its times are dates of an unknown zone.
-    #[error("dates without a zone, taken for UTC: hours off where they are local")]
+    /// The times are dates in an unknown time zone.
+    #[error("the times are dates without a time zone, taken as UTC: hours off if they are local")]
     LocalDates,
-    /// Its times are no dates.
+    /// The times are not dates.
     #[error(
-        "times that are no dates: nothing says when the video began, unless the log began with it"
+        "the times are not dates: when the video began is unknown, unless the log began with it"
     )]
     NoDates,
 }
@@ -108,7 +108,7 @@ impl LogReason {
                 };
             }
             Self::NoSpeed(_) => {
-                "switch the camera's GPS on and wait for its fix; or bring another log beside the video"
+                "switch on the camera's GPS and wait for a fix, or record another log with the video"
             }
             Self::Holds { log, format, .. } => {
                 // A GoPro's log is in its video.
@@ -118,27 +118,29 @@ impl LogReason {
                 };
                 let log = log.display();
                 return format!(
-                    "make a drive of {log}{beside} and the camera; then examine the drive"
+                    "make a drive from {log}{beside} and the camera, then examine the drive"
                 );
             }
-            Self::Sparse { .. } => "log at 1 Hz or more; an OBD reader or CAN gives ten a second",
+            Self::Sparse { .. } => "log at 1 Hz or more; OBD readers and CAN give about 10 Hz",
             Self::Gap { .. } => {
-                "max_gap_s in dataset.toml bridges it in a straight line, where the vehicle did not stop in between"
+                "if the vehicle did not stop in between, set max_gap_s in dataset.toml to interpolate over it"
             }
-            Self::TooFast { .. } => "say the unit of speed (m/s, km/h, mph, knots)",
+            Self::TooFast { .. } => "give the unit of speed (m/s, km/h, mph, knots)",
             Self::Standing { .. } => "log a drive",
             Self::Unsure { .. } => {
                 "drive faster or longer, or log the vehicle's own speed: OBD, CAN"
             }
             Self::CourseAlone | Self::NoTurns => {
-                "poses by the network or by the distance driven need no turns; a second log with a gyroscope brings them"
+                "use poses from the network or the distance driven, which need no turns, or add a second log with a gyroscope"
             }
-            Self::Dates => "pictures and speeds show what is left between the clocks",
+            Self::Dates => {
+                "nothing to do; pictures and speeds show what remains of the clocks' offset"
+            }
             Self::LocalDates => {
-                "say the log's time zone; pictures and speeds show what is left between the clocks"
+                "give the log's time zone; pictures and speeds show what remains of the clocks' offset"
             }
             Self::NoDates => {
-                "say when the first frame was taken, on the log's clock; pictures and speeds show what is left between the clocks"
+                "give the time of the first frame on the log's clock; pictures and speeds show what remains of the clocks' offset"
             }
         };
         text.to_owned()
@@ -175,7 +177,7 @@ mod tests {
         );
         assert_eq!(
             holds.hint(),
-            "make a drive of drive.csv with its video and the camera; then examine the drive"
+            "make a drive from drive.csv with its video and the camera, then examine the drive"
         );
     }
 
@@ -192,11 +194,11 @@ mod tests {
             ),
             (
                 LogReason::Gap { longest_s: 12.34 },
-                "12.3 s without a speed: frames of that time are not used",
+                "12.3 s without a speed: frames in that time are not used",
             ),
             (
                 LogReason::TooFast { fastest_mps: 99.0 },
-                "99 m/s are 356 km/h: the unit is another one, and every depth would be scaled by it",
+                "99 m/s is 356 km/h: the unit is wrong, and every depth would be wrong by the same factor",
             ),
             (
                 LogReason::Standing {
@@ -206,24 +208,23 @@ mod tests {
             ),
             (
                 LogReason::Unsure { sigma_percent: 8.2 },
-                "expect distances, and with them a short drive's scale, within ±8 %: such pairs weigh less in training, above 20 % nothing",
+                "distances, and with them a short drive's scale, are accurate to ±8 %: such pairs get less weight in training, and none above 20 %",
             ),
             (
                 LogReason::CourseAlone,
-                "turns are known from positions alone: enough to compare the clocks on a few minutes with bends, not for the vehicle's own \
-                 poses",
+                "turns are known from positions alone: enough to compare the clocks over a few minutes with bends, but not for the vehicle's own poses",
             ),
             (
                 LogReason::NoTurns,
-                "nothing says how the vehicle turned: the vehicle's own poses cannot train, and clocks are compared by changes of speed alone",
+                "no turns were recorded: training cannot use the vehicle's own poses, and clocks are compared by changes of speed alone",
             ),
             (
                 LogReason::Dates,
-                "dates in UTC: the video begins when its recorder says that it was made, to a second or so",
+                "the times are dates in UTC: the video's start is the creation time that its recorder wrote, accurate to a second or so",
             ),
             (
                 LogReason::NoDates,
-                "times that are no dates: nothing says when the video began, unless the log began with it",
+                "the times are not dates: when the video began is unknown, unless the log began with it",
             ),
         ] {
             assert_eq!(reason.to_string(), said);

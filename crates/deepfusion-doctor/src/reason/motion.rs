@@ -10,9 +10,9 @@ pub enum MotionReason {
     /// The speeds contradict the road in the images.
     #[error("{0}")]
     Road(SpeedWarning),
-    /// Neither road nor poses say whether the speeds are right.
+    /// Neither road nor poses show whether the speeds are right.
     #[error(
-        "neither road nor poses show whether the speeds are right: by them the vehicle drives up to {fastest_mps:.1} m/s ({:.0} km/h)",
+        "neither road nor poses show whether the speeds are right: according to them, the vehicle drives at up to {fastest_mps:.1} m/s ({:.0} km/h)",
         3.6 * fastest_mps
     )]
     Unchecked {
@@ -21,80 +21,80 @@ pub enum MotionReason {
     },
     /// The recording's own poses contradict its speeds.
     #[error(
-        "the poses go {by_poses_m:.0} m, the speeds {by_speeds_m:.0} m: depths would come out {depth_factor:.2} times as large"
+        "the poses cover {by_poses_m:.0} m, the speeds {by_speeds_m:.0} m: depths would come out {depth_factor:.2} times as large"
     )]
     Poses {
-        /// The way by the poses, metres.
+        /// Distance driven according to the poses, metres.
         by_poses_m: f64,
-        /// The way by the speeds, metres.
+        /// Distance driven according to the speeds, metres.
         by_speeds_m: f64,
-        /// How many times as large depths would come out.
+        /// Factor by which depths would be too large.
         depth_factor: f64,
     },
     /// The radial velocities of a LiDAR contradict the speeds.
     #[error(
-        "the vehicle's speed is {factor:.2} times what the LiDAR's {scans} scans say: depths would come out {factor:.2} times as large"
+        "the vehicle's speed is {factor:.2} times what the LiDAR's {scans} scans show: depths would come out {factor:.2} times as large"
     )]
     LidarSpeed {
-        /// How many times the LiDAR's the speed is.
+        /// The vehicle's speed over the LiDAR's.
         factor: f64,
-        /// Scans that say so.
+        /// Number of scans that were compared.
         scans: usize,
     },
-    /// By its radial velocities a LiDAR drives to another side than its mount says.
+    /// According to its radial velocities, a LiDAR moves left or right of the direction that its mount gives.
     #[error(
-        "by its radial velocities the LiDAR drives {:.1} degrees to the {} of where its mount says",
+        "according to its radial velocities, the LiDAR moves {:.1} degrees to the {} of the direction that its mount gives",
         left_deg.abs(),
         if *left_deg > 0.0 { "left" } else { "right" }
     )]
     LidarSideways {
-        /// How far to the left, degrees.
+        /// Angle to the left, degrees.
         left_deg: f64,
     },
-    /// By its radial velocities a LiDAR drives higher or lower than its mount says.
+    /// According to its radial velocities, a LiDAR moves above or below the direction that its mount gives.
     #[error(
-        "by its radial velocities the LiDAR drives {:.1} degrees {} where its mount says",
+        "according to its radial velocities, the LiDAR moves {:.1} degrees {} the direction that its mount gives",
         up_deg.abs(),
         if *up_deg > 0.0 { "above" } else { "below" }
     )]
     LidarUpward {
-        /// How far up, degrees.
+        /// Angle upward, degrees.
         up_deg: f64,
     },
-    /// Many dynamic points do not move by their radial velocity.
+    /// Many dynamic points are static according to their radial velocity.
     #[error(
-        "of {} that the topic of dynamic points lists, {in_scan} are in the scans and {fast} move by their radial velocity",
+        "of {} in the topic of dynamic points, {in_scan} are in the scans and {fast} are dynamic according to their radial velocity",
         count_of(*listed, "point")
     )]
     DynamicAndSlow {
-        /// Points that the topic lists.
+        /// Number of points in the topic.
         listed: usize,
-        /// Of these, points of the scans.
+        /// How many of them are in the scans.
         in_scan: usize,
-        /// Of these, points that move by their radial velocity.
+        /// How many of them are dynamic according to their radial velocity.
         fast: usize,
     },
-    /// Many points that move by their radial velocity are no dynamic points.
+    /// Many points that are dynamic according to their radial velocity are not in the topic of dynamic points.
     #[error(
-        "of {fast} points that move by their radial velocity, the topic of dynamic points lists {listed}"
+        "of {fast} points that are dynamic according to their radial velocity, the topic of dynamic points contains {listed}"
     )]
     FastAndUnlisted {
-        /// Points that move by their radial velocity.
+        /// Number of points that are dynamic according to their radial velocity.
         fast: usize,
-        /// Of these, points that the topic lists.
+        /// How many of them are in the topic.
         listed: usize,
     },
-    /// The gyro feels other turns than the steering says.
+    /// The gyroscope measures other turns than the steering gives.
     #[error(
         "in {turning_s:.0} s of turning the vehicle turned {factor:.2} times as far as its steering says: the wheelbase or the steering ratio is wrong"
     )]
     Steering {
-        /// For how long it turned, seconds.
+        /// Time during which the vehicle turned, seconds.
         turning_s: f64,
-        /// How many times as far as the steering says.
+        /// Measured turn over the turn that the steering gives.
         factor: f64,
     },
-    /// The camera's clock is another one than the vehicle's.
+    /// The camera's clock is ahead of the vehicle's, or behind it.
     #[error(
         "the camera's clock is {:.0} ± {:.0} ms {} the vehicle's: every frame gets the speed of another moment",
         1e3 * vehicle_minus_camera_s.abs(),
@@ -106,26 +106,26 @@ pub enum MotionReason {
         vehicle_minus_camera_s: f64,
         /// The standard error of that, seconds.
         std_error_s: f64,
-        /// How far the camera's clock is ahead in all, with what the recording says of it already, seconds.
+        /// Total offset by which the camera's clock is ahead, with the one that the recording gives already, seconds.
         camera_ahead_s: f64,
     },
-    /// The pictures turn the other way.
+    /// The picture turns the other way.
     #[error(
         "the picture turns right where the vehicle turns left: the images are mirrored, or the yaw rate has the wrong sign"
     )]
     Mirrored,
-    /// The pictures turn at other times.
+    /// The picture turns at other times.
     #[error(
-        "the picture's turns do not follow the vehicle's: clock, yaw rate or camera are not of this drive"
+        "the picture's turns do not follow the vehicle's: the clock, yaw rate or camera belongs to another drive"
     )]
     TurnsUnrelated,
-    /// The pictures turn by another angle.
+    /// The picture turns by another angle.
     #[error(
         "turns come out {factor:.2} times the vehicle's with this focal length: it is about {:.2} times the true one (or the yaw rate has another unit), and depths would be wrong by as much",
         1.0 / factor
     )]
     TurnsFactor {
-        /// How many times the vehicle's turns the picture's are.
+        /// The picture's turns over the vehicle's.
         factor: f64,
     },
 }
@@ -137,19 +137,19 @@ impl MotionReason {
             Self::Road(warning) => match warning.likely_unit() {
                 Some(unit) => {
                     return format!(
-                        "divide the speeds: they seem to be in {unit} (speed_unit says so for tables and bare numbers)"
+                        "divide the speeds: they seem to be in {unit} (for tables and bare numbers, set speed_unit)"
                     );
                 }
-                None => "see the speed signal's unit and factor, and the camera's focal length",
+                None => "check the speed signal's unit and factor, and the camera's focal length",
             },
             Self::Unchecked { .. } => {
-                "was it as fast? With a wrong unit (km/h taken for m/s) every depth would be wrong by the same factor"
+                "check that it was that fast; with a wrong unit (km/h taken for m/s) every depth would be wrong by the same factor"
             }
             Self::Poses { .. } => {
-                "see the speed signal's unit and factor (km/h is 3.6, a worn tyre 1.02)"
+                "check the speed signal's unit and factor (3.6 for km/h, 1.02 for a worn tyre)"
             }
             Self::LidarSpeed { .. } => {
-                "see the speed signal's unit and factor (km/h is 3.6), and lidar.receding for the sign of the radial velocities"
+                "check the speed signal's unit and factor (3.6 for km/h), and lidar.receding for the sign of the radial velocities"
             }
             Self::LidarSideways { .. } => {
                 "correct the yaw of cam_from_lidar or of cam_from_vehicle by that angle"
@@ -158,10 +158,10 @@ impl MotionReason {
                 "correct the pitch of cam_from_lidar or of cam_from_vehicle by that angle"
             }
             Self::DynamicAndSlow { .. } => {
-                "topics.dynamic names the topic; its points must be the LiDAR's, in its axes and at its times; lidar.moving_mps may be too high"
+                "check that the topic in topics.dynamic has the LiDAR's points, in its axes and at its times; lidar.moving_mps may be too high"
             }
             Self::FastAndUnlisted { .. } => {
-                "see lidar.over_ground and lidar.velocity_field; lidar.moving_mps may be lower than the driver's threshold"
+                "check lidar.over_ground and lidar.velocity_field; lidar.moving_mps may be lower than the driver's threshold"
             }
             Self::Steering { factor, .. } => {
                 return format!(
@@ -171,8 +171,7 @@ impl MotionReason {
             }
             Self::ClockOffset { camera_ahead_s, .. } => {
                 return format!(
-                    "clock.camera_ahead_s = {camera_ahead_s:.3} in dataset.toml or the TOML file beside a bag, or a clock offset of {:.0} ms given. Better: one \
-                     clock for all (PTP, trigger)",
+                    "set clock.camera_ahead_s = {camera_ahead_s:.3} in dataset.toml or the TOML file beside a bag, or give a clock offset of {:.0} ms; better, use one clock for all sensors (PTP, trigger)",
                     1e3 * camera_ahead_s
                 );
             }
@@ -184,7 +183,7 @@ impl MotionReason {
             }
             Self::TurnsFactor { factor } => {
                 return format!(
-                    "calibrate at the size of these images; fx and fy times {factor:.2} would fit"
+                    "calibrate at this image size; fx and fy times {factor:.2} would fit"
                 );
             }
         };
@@ -206,7 +205,7 @@ mod tests {
         for (reason, said) in [
             (
                 MotionReason::Unchecked { fastest_mps: 50.04 },
-                "neither road nor poses show whether the speeds are right: by them the vehicle drives up to 50.0 m/s (180 km/h)",
+                "neither road nor poses show whether the speeds are right: according to them, the vehicle drives at up to 50.0 m/s (180 km/h)",
             ),
             (
                 MotionReason::Poses {
@@ -214,14 +213,14 @@ mod tests {
                     by_speeds_m: 361.0,
                     depth_factor: 3.603,
                 },
-                "the poses go 100 m, the speeds 361 m: depths would come out 3.60 times as large",
+                "the poses cover 100 m, the speeds 361 m: depths would come out 3.60 times as large",
             ),
             (
                 MotionReason::LidarSpeed {
                     factor: 3.604,
                     scans: 40,
                 },
-                "the vehicle's speed is 3.60 times what the LiDAR's 40 scans say: depths would come out 3.60 times as large",
+                "the vehicle's speed is 3.60 times what the LiDAR's 40 scans show: depths would come out 3.60 times as large",
             ),
             (
                 MotionReason::DynamicAndSlow {
@@ -229,14 +228,14 @@ mod tests {
                     in_scan: 390,
                     fast: 12,
                 },
-                "of 400 points that the topic of dynamic points lists, 390 are in the scans and 12 move by their radial velocity",
+                "of 400 points in the topic of dynamic points, 390 are in the scans and 12 are dynamic according to their radial velocity",
             ),
             (
                 MotionReason::FastAndUnlisted {
                     fast: 400,
                     listed: 12,
                 },
-                "of 400 points that move by their radial velocity, the topic of dynamic points lists 12",
+                "of 400 points that are dynamic according to their radial velocity, the topic of dynamic points contains 12",
             ),
         ] {
             assert_eq!(reason.to_string(), said);
@@ -248,19 +247,19 @@ mod tests {
         for (reason, said) in [
             (
                 MotionReason::LidarSideways { left_deg: 3.96 },
-                "by its radial velocities the LiDAR drives 4.0 degrees to the left of where its mount says",
+                "according to its radial velocities, the LiDAR moves 4.0 degrees to the left of the direction that its mount gives",
             ),
             (
                 MotionReason::LidarSideways { left_deg: -3.96 },
-                "by its radial velocities the LiDAR drives 4.0 degrees to the right of where its mount says",
+                "according to its radial velocities, the LiDAR moves 4.0 degrees to the right of the direction that its mount gives",
             ),
             (
                 MotionReason::LidarUpward { up_deg: 3.96 },
-                "by its radial velocities the LiDAR drives 4.0 degrees above where its mount says",
+                "according to its radial velocities, the LiDAR moves 4.0 degrees above the direction that its mount gives",
             ),
             (
                 MotionReason::LidarUpward { up_deg: -3.96 },
-                "by its radial velocities the LiDAR drives 4.0 degrees below where its mount says",
+                "according to its radial velocities, the LiDAR moves 4.0 degrees below the direction that its mount gives",
             ),
         ] {
             assert_eq!(reason.to_string(), said);
@@ -326,7 +325,7 @@ mod tests {
         for (reason, hint) in [
             (
                 km_h,
-                "divide the speeds: they seem to be in km/h (speed_unit says so for tables and bare numbers)",
+                "divide the speeds: they seem to be in km/h (for tables and bare numbers, set speed_unit)",
             ),
             (
                 steering,
@@ -334,12 +333,11 @@ mod tests {
             ),
             (
                 MotionReason::TurnsFactor { factor: 0.8 },
-                "calibrate at the size of these images; fx and fy times 0.80 would fit",
+                "calibrate at this image size; fx and fy times 0.80 would fit",
             ),
             (
                 clock,
-                "clock.camera_ahead_s = 0.120 in dataset.toml or the TOML file beside a bag, or a clock offset of 120 ms given. Better: one clock for all \
-                 (PTP, trigger)",
+                "set clock.camera_ahead_s = 0.120 in dataset.toml or the TOML file beside a bag, or give a clock offset of 120 ms; better, use one clock for all sensors (PTP, trigger)",
             ),
         ] {
             assert_eq!(reason.hint(), hint);

@@ -1,10 +1,10 @@
-//! What of a recording cannot be read, or is taken for granted.
+//! What cannot be read of a recording, or was assumed about it.
 
 use crate::shared_error::SharedError;
 use deepfusion_data::{DataWarning, Error};
 use deepfusion_hint::Hint;
 
-/// What of a recording cannot be read, or is taken for granted.
+/// What cannot be read of a recording, or was assumed about it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OpeningReason {
@@ -20,22 +20,22 @@ pub enum OpeningReason {
         if *left_out { "training leaves this drive out" } else { "no pair of frames can train" }
     )]
     NoPair {
-        /// Whether training goes on without it: others of its folder have some, and nothing is wrong with it beyond that.
+        /// Whether training continues without it: other drives of its folder have pairs, and nothing else is wrong with it.
         left_out: bool,
-        /// Why it has none.
+        /// Why it has no such pair.
         problem: SharedError<Error>,
     },
-    /// Nothing says how the vehicle turned.
+    /// No turns were recorded.
     #[error(
         "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked; training takes the turns from the images"
     )]
     NoTurns,
-    /// A course of positions alone says how the vehicle turned.
+    /// Turns are known from a course of positions alone.
     #[error(
-        "no yaw rate was recorded, but a track of positions: the clock can be checked, turns and the camera's direction cannot; training takes the turns from the images"
+        "no yaw rate was recorded, only a track of positions: the clock can be checked, but not turns and the camera's direction; training takes the turns from the images"
     )]
     CourseAlone,
-    /// What opening it warns of.
+    /// A warning given on opening the recording.
     #[error(transparent)]
     Warning(#[from] DataWarning),
 }

@@ -1,15 +1,15 @@
-//! What is wrong with how the pictures look.
+//! What is wrong with the pictures.
 
 use deepfusion_hint::count_of;
 use std::fmt;
 
-/// What is wrong with how the pictures look.
+/// What is wrong with the pictures.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PicturesReason {
-    /// They hardly change from frame to frame.
+    /// The pictures hardly change from frame to frame.
     #[error(
-        "from frame to frame the picture hardly moves: what is taught lies below the images' noise"
+        "the picture hardly moves from frame to frame: the parallax is below the images' noise"
     )]
     LittleParallax,
     /// Neighbours differ in brightness.
@@ -21,53 +21,53 @@ pub enum PicturesReason {
         100.0 * (first_ratio - 1.0)
     )]
     BrightnessJumps {
-        /// How many do.
+        /// Number of neighbours that differ.
         jumps: usize,
-        /// Of how many.
+        /// Number of neighbours.
         neighbours: u32,
-        /// By which share.
+        /// Least difference in brightness that counts, as a share.
         more_than: f64,
         /// The number of the first frame that does.
         first: u64,
-        /// How many times as bright as the frame before it is.
+        /// Its brightness over that of the frame before.
         first_ratio: f64,
     },
-    /// They are dark.
+    /// The pictures are dark.
     #[error("most of the picture is black: nothing can be compared there")]
     Dark,
-    /// They are overexposed.
+    /// The pictures are overexposed.
     #[error("much of the picture is white: nothing can be compared there")]
     White,
-    /// The finest detail is missing in all of them.
+    /// All pictures lack the finest detail.
     #[error("the pictures lack the finest detail, as out of focus, shaken or enlarged ones do")]
     Soft,
-    /// Some are blurred.
+    /// Some pictures are blurred.
     #[error(
         "{blurred} of {} {} less than half the drive's usual sharpness, the first of them frame {first}",
         count_of(*frames, "frame"),
         if *blurred == 1 { "has" } else { "have" }
     )]
     Blurred {
-        /// How many.
+        /// Number of blurred frames.
         blurred: usize,
-        /// Of how many.
+        /// Number of frames.
         frames: usize,
-        /// The number of the first.
+        /// The number of the first blurred frame.
         first: u64,
     },
-    /// A part of them belongs to the vehicle.
+    /// A part of the pictures belongs to the ego vehicle.
     #[error(
-        "{pixels} pixels at the {side} do not change while the vehicle moves (over {:.0} % of that side): they teach that what stands still on the vehicle is infinitely far",
+        "{pixels} pixels at the {side} do not change while the vehicle moves (over {:.0} % of that side): training on them teaches that this part of the vehicle is infinitely far",
         100.0 * share
     )]
     StillRim {
-        /// At which side.
+        /// Side of the picture.
         side: ImageSide,
-        /// How far in, pixels.
+        /// How far the part reaches inward, pixels.
         pixels: u32,
-        /// Along which share of the side.
+        /// Share of the side that it covers.
         share: f64,
-        /// How far the image reaches from that side to the other, pixels.
+        /// Size of the image from that side to the opposite one, pixels.
         across: u32,
     },
 }
@@ -77,15 +77,15 @@ impl PicturesReason {
     pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::LittleParallax => {
-                "take frames further apart (frames = [3], or frame_distance_m = 0.2, in the training's configuration), or drives at more speed"
+                "take frames further apart (frames = [3], or frame_distance_m = 0.2, in the training's configuration), or faster drives"
             }
             Self::BrightnessJumps { .. } => {
-                "fix the camera's exposure and gain, or let them change slowly; record anew"
+                "record again with fixed exposure and gain, or let them change slowly"
             }
             Self::Dark => "expose longer, or leave the darkest drives out",
             Self::White => "expose shorter",
             Self::Soft => {
-                "focus the lens, clean the windscreen, expose shorter; enlarged pictures train as well at half their size"
+                "focus the lens, clean the windscreen or expose shorter; use enlarged pictures at half their size"
             }
             Self::Blurred { .. } => "expose shorter, fix the mount, or leave these frames out",
             Self::StillRim {
@@ -103,7 +103,7 @@ impl PicturesReason {
                     }
                     ImageSide::Right => format!("columns 0 to {last}"),
                 };
-                return format!("cut them off: keep {keep}");
+                return format!("crop the images: keep {keep}");
             }
         };
         text.to_owned()
@@ -161,7 +161,7 @@ mod tests {
         for (reason, said) in [
             (
                 PicturesReason::LittleParallax,
-                "from frame to frame the picture hardly moves: what is taught lies below the images' noise",
+                "the picture hardly moves from frame to frame: the parallax is below the images' noise",
             ),
             (
                 jumps(1, 1.3),
@@ -191,13 +191,11 @@ mod tests {
             ),
             (
                 rim(ImageSide::Bottom),
-                "14 pixels at the bottom do not change while the vehicle moves (over 99 % of that side): they teach that what stands still \
-                 on the vehicle is infinitely far",
+                "14 pixels at the bottom do not change while the vehicle moves (over 99 % of that side): training on them teaches that this part of the vehicle is infinitely far",
             ),
             (
                 rim(ImageSide::Left),
-                "14 pixels at the left do not change while the vehicle moves (over 99 % of that side): they teach that what stands still on \
-                 the vehicle is infinitely far",
+                "14 pixels at the left do not change while the vehicle moves (over 99 % of that side): training on them teaches that this part of the vehicle is infinitely far",
             ),
         ] {
             assert_eq!(reason.to_string(), said);
@@ -215,19 +213,19 @@ mod tests {
         for (reason, hint) in [
             (
                 rim(ImageSide::Bottom, 94),
-                "cut them off: keep rows 0 to 81",
+                "crop the images: keep rows 0 to 81",
             ),
             (
                 rim(ImageSide::Top, 94),
-                "cut them off: keep rows from 12, and subtract 12 from cy",
+                "crop the images: keep rows from 12, and subtract 12 from cy",
             ),
             (
                 rim(ImageSide::Left, 320),
-                "cut them off: keep columns from 12, and subtract 12 from cx",
+                "crop the images: keep columns from 12, and subtract 12 from cx",
             ),
             (
                 rim(ImageSide::Right, 320),
-                "cut them off: keep columns 0 to 307",
+                "crop the images: keep columns 0 to 307",
             ),
         ] {
             assert_eq!(reason.hint(), hint);

@@ -1,25 +1,25 @@
-//! Why nothing shows where the camera looks.
+//! Why the camera's direction cannot be found.
 
 use crate::reason::HeadingAngle;
 use deepfusion_hint::{Hint, count_of};
 use std::fmt;
 
-/// Why nothing shows where the camera looks.
+/// Why the camera's direction cannot be found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraSkip {
-    /// Too few pictures were taken straight ahead.
+    /// Too few pictures were taken driving straight ahead.
     #[error(transparent)]
     Heading(#[from] NoHeading),
     /// No angle is known well enough.
     #[error("not sure enough: {}", together(.0))]
     Unsure(Vec<UnsureHeading>),
-    /// Nothing says how the camera is mounted.
+    /// The camera's mount is unknown.
     #[error("nothing says where the camera is on the vehicle")]
     NoMount,
     /// Too little of the road was measured.
     #[error(
-        "the road before the camera is in the measured depth of {}, {needed} are needed",
+        "the measured depth shows the road ahead in {}, {needed} are needed",
         count_of(*frames, "frame")
     )]
     LittleRoad {
@@ -28,30 +28,30 @@ pub enum CameraSkip {
         /// How many are needed.
         needed: usize,
     },
-    /// What was measured before the camera is not the road alone.
+    /// The depth measured ahead of the camera is not only of the road.
     #[error(
-        "the planes before the camera differ between frames (pitch by {pitch_deg:.1} degrees, roll by {roll_deg:.1}): not the road alone"
+        "the planes before the camera differ between frames (pitch by {pitch_deg:.1} degrees, roll by {roll_deg:.1}): they are not the road alone"
     )]
     UnevenRoad {
-        /// By how much the pitch differs, degrees.
+        /// How far the pitch scatters, degrees.
         pitch_deg: f64,
-        /// By how much the roll differs, degrees.
+        /// How far the roll scatters, degrees.
         roll_deg: f64,
     },
-    /// The two cameras see too little alike.
+    /// The two cameras have too few points in common.
     #[error("too few points are seen by both cameras")]
     FewPoints,
-    /// There is one camera.
-    #[error("one camera")]
+    /// The recording has only one camera.
+    #[error("the recording has one camera")]
     OneCamera,
 }
 
-/// Where the camera heads along an axis, with too large a standard error.
+/// An angle of the camera's direction of travel whose standard error is too large.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnsureHeading {
-    /// Along which one.
+    /// The angle.
     pub angle: HeadingAngle,
-    /// How far it is off, degrees: up and to the right are positive.
+    /// Difference from the mount, degrees: up and to the right are positive.
     pub off_deg: f64,
     /// The standard error of that, degrees.
     pub std_error_deg: f64,
@@ -66,7 +66,7 @@ impl fmt::Display for UnsureHeading {
         } = self;
         write!(
             f,
-            "{angle} of the way ahead {off_deg:.1} ± {std_error_deg:.1} degrees"
+            "{angle} of the direction of travel {off_deg:.1} ± {std_error_deg:.1} degrees"
         )
     }
 }
@@ -76,12 +76,12 @@ fn together(unsure: &[UnsureHeading]) -> String {
     unsure.join(", ")
 }
 
-/// Why images do not show where a camera heads.
+/// Too few images from which to find the camera's direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{} straight ahead, {needed} are needed", count_of(*straight, "pair"))]
 #[non_exhaustive]
 pub struct NoHeading {
-    /// Pairs of them that were taken driving straight ahead.
+    /// Number of pairs that were taken driving straight ahead.
     pub straight: usize,
     /// How many are needed.
     pub needed: usize,
@@ -89,10 +89,7 @@ pub struct NoHeading {
 
 impl Hint for NoHeading {
     fn hint(&self) -> Option<String> {
-        Some(
-            "give a drive with more of it straight ahead, or the camera's place on the vehicle"
-                .into(),
-        )
+        Some("use a drive with more straight stretches, or give the camera's mount".into())
     }
 }
 
@@ -117,7 +114,7 @@ mod tests {
             ),
             (
                 CameraSkip::Unsure([HeadingAngle::Pitch, HeadingAngle::Yaw].map(unsure).into()),
-                "not sure enough: pitch of the way ahead -0.4 ± 0.7 degrees, yaw of the way ahead -0.4 ± 0.7 degrees",
+                "not sure enough: pitch of the direction of travel -0.4 ± 0.7 degrees, yaw of the direction of travel -0.4 ± 0.7 degrees",
             ),
             (
                 CameraSkip::NoMount,
@@ -128,14 +125,14 @@ mod tests {
                     frames: 3,
                     needed: 4,
                 },
-                "the road before the camera is in the measured depth of 3 frames, 4 are needed",
+                "the measured depth shows the road ahead in 3 frames, 4 are needed",
             ),
             (
                 CameraSkip::UnevenRoad {
                     pitch_deg: 1.26,
                     roll_deg: 2.0,
                 },
-                "the planes before the camera differ between frames (pitch by 1.3 degrees, roll by 2.0): not the road alone",
+                "the planes before the camera differ between frames (pitch by 1.3 degrees, roll by 2.0): they are not the road alone",
             ),
             (
                 CameraSkip::FewPoints,

@@ -1,23 +1,23 @@
-//! Why nothing shows how far the camera's clock and the vehicle's are apart.
+//! Why the offset of the camera's clock and the vehicle's cannot be found.
 
 use crate::camera_ahead::NoCameraAhead;
 use deepfusion_motion::NoTimeOffset;
 
-/// Why nothing shows how far the camera's clock and the vehicle's are apart.
+/// Why the offset of the camera's clock and the vehicle's cannot be found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ClockSkip {
     /// Nothing was recorded to compare the pictures with.
     #[error("no speed and yaw rate to compare the picture with")]
     NoRates,
-    /// A course of positions does not show it. What it says is of the drive that the check is of.
+    /// A course of positions does not show it. The drive that the reason names is the one that is checked.
     #[error("{}", .0.reason())]
     ByCourse(NoCameraAhead),
-    /// The pictures do not follow the vehicle.
+    /// The picture's motion does not match the vehicle's.
     #[error(transparent)]
     NotFound(#[from] NoTimeOffset),
     /// The offset is not known well enough.
-    #[error("the estimate {offset_s:.2} s has a standard error of {std_error_s:.2} s")]
+    #[error("the estimate of {offset_s:.2} s has a standard error of {std_error_s:.2} s")]
     Unsure {
         /// The offset, vehicle less camera, seconds.
         offset_s: f64,
@@ -30,14 +30,14 @@ pub enum ClockSkip {
 mod tests {
     use super::*;
 
-    /// The drive is named beside it.
+    /// The messages leave out the drive's name, which is printed beside them.
     #[test]
     fn why_the_clocks_are_not_compared_is_said() {
         let drive = "monday".to_owned();
         for (reason, said) in [
             (
                 ClockSkip::ByCourse(NoCameraAhead::NoSpeeds { drive }),
-                "the clocks cannot be compared: it has no speeds, or its frames no times",
+                "the clocks cannot be compared: there are no speeds, or the frames have no times",
             ),
             (
                 NoTimeOffset::NothingChanges.into(),
@@ -48,7 +48,7 @@ mod tests {
                     offset_s: 0.304,
                     std_error_s: 0.12,
                 },
-                "the estimate 0.30 s has a standard error of 0.12 s",
+                "the estimate of 0.30 s has a standard error of 0.12 s",
             ),
         ] {
             assert_eq!(reason.to_string(), said);

@@ -1,19 +1,19 @@
-//! Why frames do not show what a check looks for.
+//! Why the frames do not allow a check.
 
-/// Why frames do not show what a check looks for.
+/// Why the frames do not allow a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FramesSkip {
-    /// They have no times.
+    /// The frames have no times.
     #[error("the frames have no time stamps")]
     NoTimes,
-    /// None of them neighbour another in motion.
+    /// No two neighbouring frames were taken while the vehicle moved.
     #[error("no neighbouring frames while the vehicle moves")]
     NoneInMotion,
-    /// Nothing says whether the vehicle moved.
+    /// It is unknown whether the vehicle moved.
     #[error("the recording has no speeds")]
     NoSpeeds,
-    /// Of no two neighbours the motion between them is known.
+    /// The motion between two neighbours is never known.
     #[error("no pair of neighbouring frames has a known motion")]
     NoKnownMotion,
 }

@@ -1,14 +1,14 @@
-//! Why a log of speeds by itself does not say what a check looks for.
+//! Why a log of speeds does not allow a check.
 
-/// Why a log of speeds by itself does not say what a check looks for.
+/// Why a log of speeds does not allow a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogSkip {
-    /// Nothing says how sure its speeds are.
-    #[error("the log does not say how sure its speeds are")]
+    /// The uncertainty of the speeds is unknown.
+    #[error("the log does not give the uncertainty of its speeds")]
     NoDeviation,
-    /// The camera wrote it itself, on its own clock.
-    #[error("the camera's own clock")]
+    /// The camera wrote the log itself, on its own clock.
+    #[error("the log is on the camera's own clock")]
     OwnClock,
 }
 
@@ -20,7 +20,7 @@ mod tests {
     fn what_a_log_lacks_is_said() {
         assert_eq!(
             LogSkip::NoDeviation.to_string(),
-            "the log does not say how sure its speeds are"
+            "the log does not give the uncertainty of its speeds"
         );
     }
 }

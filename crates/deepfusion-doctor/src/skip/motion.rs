@@ -1,67 +1,67 @@
-//! Why nothing shows how the vehicle moved.
+//! Why the vehicle's motion is not known well enough for a check.
 
 use deepfusion_hint::count_of;
 
-/// Why nothing shows how the vehicle moved.
+/// Why the vehicle's motion is not known well enough for a check.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MotionSkip {
-    /// Neither road nor poses tell of the speeds.
-    #[error("no road to see (too dark, too plain, or turns that nothing shows), and no poses")]
+    /// There is neither a road nor poses to compare the speeds with.
+    #[error("no visible road (too dark, too plain, or unknown turns), and no poses")]
     NoRoad,
-    /// No LiDAR tells of the speeds.
+    /// There is no LiDAR to compare the speeds with.
     #[error("no LiDAR with radial velocities, or no scans of it while the vehicle moves")]
     NoRadialVelocities,
-    /// No two sources of dynamic points are there.
-    #[error("no topic of dynamic points beside a LiDAR with radial velocities")]
+    /// There are no two sources of dynamic points.
+    #[error("no topic of dynamic points together with a LiDAR with radial velocities")]
     NoDynamicPoints,
     /// Too few points are dynamic.
-    #[error("too little moves in {}", count_of(*scans, "scan"))]
+    #[error("too few points move in {}", count_of(*scans, "scan"))]
     LittleDynamic {
-        /// Scans that were looked at.
+        /// Number of scans that were examined.
         scans: usize,
     },
-    /// Neither steering angle nor inertial unit is there.
-    #[error("no steering angle and inertial unit beside the speed")]
+    /// There is neither a steering angle nor an inertial unit.
+    #[error("no steering angle and inertial unit recorded with the speed")]
     NotFused,
-    /// No inertial unit is there.
+    /// There is no inertial unit.
     #[error("no inertial unit to compare the steering with")]
     NoImu,
-    /// No steering angle says a yaw rate.
-    #[error("no steering angle, or no vehicle.wheelbase_m to make it a yaw rate")]
+    /// No steering angle gives a yaw rate.
+    #[error("no steering angle, or no vehicle.wheelbase_m to convert it to a yaw rate")]
     NoSteering,
-    /// The vehicle does not turn where it is slow.
+    /// The vehicle does not turn at low speed.
     #[error("the vehicle does not turn below {below_mps} m/s")]
     NoSlowTurns {
-        /// What is slow, m/s.
+        /// Speed below which turns are compared, m/s.
         below_mps: f64,
     },
-    /// It turns too little where it is slow.
+    /// The vehicle turns too little at low speed.
     #[error("{turning_s:.1} s of turning below {below_mps} m/s, {needed_s} s are needed")]
     FewSlowTurns {
-        /// For how long it does, seconds.
+        /// Time during which it turns, seconds.
         turning_s: f64,
-        /// What is slow, m/s.
+        /// Speed below which turns are compared, m/s.
         below_mps: f64,
-        /// For how long is needed, seconds.
+        /// The time that is needed, seconds.
         needed_s: f64,
     },
     /// Too few pictures show a turn.
     #[error("{} with a turn, {needed} are needed", count_of(*pairs, "pair"))]
     FewTurns {
-        /// Pairs of them that do.
+        /// Number of pairs with a turn.
         pairs: usize,
         /// How many are needed.
         needed: usize,
     },
-    /// The vehicle drives straight on.
+    /// The vehicle drives straight ahead.
     #[error(
         "the vehicle hardly turns (yaw rate ±{spread_radps:.3} rad/s, {needed_radps} are needed)"
     )]
     HardlyTurns {
         /// The standard deviation of its yaw rate, rad/s.
         spread_radps: f64,
-        /// What is needed, rad/s.
+        /// The standard deviation that is needed, rad/s.
         needed_radps: f64,
     },
 }
@@ -75,19 +75,19 @@ mod tests {
         for (reason, said) in [
             (
                 MotionSkip::NoRoad,
-                "no road to see (too dark, too plain, or turns that nothing shows), and no poses",
+                "no visible road (too dark, too plain, or unknown turns), and no poses",
             ),
             (
                 MotionSkip::NoDynamicPoints,
-                "no topic of dynamic points beside a LiDAR with radial velocities",
+                "no topic of dynamic points together with a LiDAR with radial velocities",
             ),
             (
                 MotionSkip::LittleDynamic { scans: 40 },
-                "too little moves in 40 scans",
+                "too few points move in 40 scans",
             ),
             (
                 MotionSkip::NotFused,
-                "no steering angle and inertial unit beside the speed",
+                "no steering angle and inertial unit recorded with the speed",
             ),
             (
                 MotionSkip::NoImu,
@@ -95,7 +95,7 @@ mod tests {
             ),
             (
                 MotionSkip::NoSteering,
-                "no steering angle, or no vehicle.wheelbase_m to make it a yaw rate",
+                "no steering angle, or no vehicle.wheelbase_m to convert it to a yaw rate",
             ),
             (
                 MotionSkip::NoSlowTurns { below_mps: 8.0 },

@@ -1,22 +1,22 @@
-//! Why pictures do not show what a check looks for.
+//! Why the pictures do not allow a check.
 
-/// Why pictures do not show what a check looks for.
+/// Why the pictures do not allow a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PicturesSkip {
-    /// None of them can be read.
+    /// No picture can be read.
     #[error("no image can be read")]
     NoImage,
-    /// All of them are plain.
+    /// No picture has any detail.
     #[error("no image has any detail")]
     NoDetail,
-    /// Too few were taken in motion.
+    /// Too few pictures were taken in motion.
     #[error("fewer than {needed} frames while the vehicle moves")]
     FewInMotion {
         /// How many are needed.
         needed: usize,
     },
-    /// None in motion shows how its points moved.
+    /// No pair in motion has points to follow and a yaw rate.
     #[error("no moving pair with points to follow and a yaw rate")]
     NoPoints,
 }

@@ -1,9 +1,9 @@
-//! How a CAN trace was understood.
+//! How a CAN trace was interpreted.
 
 use crate::units::SpeedUnit;
 use deepfusion_hint::count_of;
 
-/// How a CAN trace was understood, or what of it was left out.
+/// How a CAN trace was interpreted, or what was left out.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CanNote {
@@ -13,42 +13,39 @@ pub enum CanNote {
         count_of(*frames, "frame")
     )]
     Signal {
-        /// Its name.
+        /// Name of the signal.
         signal: String,
-        /// Its unit.
+        /// Unit of the signal.
         unit: SpeedUnit,
-        /// How many frames gave a speed.
+        /// Number of frames that gave a speed.
         speeds: usize,
-        /// How many frames the trace has.
+        /// Number of frames in the trace.
         frames: usize,
     },
-    /// The signal's message comes on several buses, of which one is read.
-    #[error(
-        "its message comes on the channels {}: {read} is read",
-        counted(channels)
-    )]
+    /// The signal's message is on several buses, one of which is read.
+    #[error("its message is on the channels {}; {read} is read", counted(channels))]
     Channels {
-        /// The buses as the trace names them, each with how many of the frames it has.
+        /// The buses as the trace names them, each with its number of frames.
         channels: Vec<(String, usize)>,
-        /// The one that is read.
+        /// The bus that is read.
         read: String,
     },
-    /// Frames that are not later than the one before.
+    /// Frames are not later than the one before.
     #[error(
-        "left out, not later than the one before: {}",
+        "left out, as not later than the frame before: {}",
         count_of(*frames, "frame")
     )]
     NotLater {
-        /// How many.
+        /// Number of such frames.
         frames: usize,
     },
-    /// Values that the description says the signal never has.
+    /// Values lie outside the signal's range in the DBC file.
     #[error(
-        "left out, beyond the range of the signal: {}",
+        "left out, as outside the signal's range: {}",
         count_of(*frames, "frame")
     )]
     BeyondRange {
-        /// How many.
+        /// Number of such frames.
         frames: usize,
     },
 }
@@ -80,15 +77,15 @@ mod tests {
                     channels: vec![("can1".into(), 1), ("can0".into(), 2)],
                     read: "can0".into(),
                 },
-                "its message comes on the channels can1 (1 frame), can0 (2 frames): can0 is read",
+                "its message is on the channels can1 (1 frame), can0 (2 frames); can0 is read",
             ),
             (
                 CanNote::NotLater { frames: 2 },
-                "left out, not later than the one before: 2 frames",
+                "left out, as not later than the frame before: 2 frames",
             ),
             (
                 CanNote::BeyondRange { frames: 1 },
-                "left out, beyond the range of the signal: 1 frame",
+                "left out, as outside the signal's range: 1 frame",
             ),
         ] {
             assert_eq!(note.to_string(), said);

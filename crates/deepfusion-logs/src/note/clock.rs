@@ -1,20 +1,20 @@
-//! How a log's clock is connected with its video's.
+//! How a log's clock is related to its video's.
 
-/// How a log's clock is connected with its video's, where neither says it.
+/// How a log's clock was related to its video's, if neither gives the offset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ClockNote {
     /// The log has dates without a zone.
-    #[error("the log's dates have no zone and are taken for UTC, as the video's are")]
+    #[error("the log's dates have no time zone and are taken as UTC, as the video's are")]
     NoZone,
-    /// The log has dates without a zone, and no video's beginning stands beside them.
-    #[error("the log's dates have no zone and are taken for UTC")]
+    /// The log has dates without a zone, and there is no video with a creation time.
+    #[error("the log's dates have no time zone and are taken as UTC")]
     LocalDates,
     /// The log counts from about its own beginning.
-    #[error("the log counts from its own start, which is taken for the video's first frame")]
+    #[error("the log counts from its own start, which is taken as the video's first frame")]
     OwnStart,
-    /// Speeds and turns are of two logs that count from starts of their own.
-    #[error("the turns are of another log: both are taken to count from the same moment")]
+    /// Speeds and turns come from two logs, each counting from its own start.
+    #[error("the turns are from another log: both logs are assumed to start at the same moment")]
     SameStart,
 }
 
@@ -26,19 +26,19 @@ mod tests {
     fn what_is_taken_for_granted_is_said() {
         assert_eq!(
             ClockNote::NoZone.to_string(),
-            "the log's dates have no zone and are taken for UTC, as the video's are"
+            "the log's dates have no time zone and are taken as UTC, as the video's are"
         );
         assert_eq!(
             ClockNote::LocalDates.to_string(),
-            "the log's dates have no zone and are taken for UTC"
+            "the log's dates have no time zone and are taken as UTC"
         );
         assert_eq!(
             ClockNote::OwnStart.to_string(),
-            "the log counts from its own start, which is taken for the video's first frame"
+            "the log counts from its own start, which is taken as the video's first frame"
         );
         assert_eq!(
             ClockNote::SameStart.to_string(),
-            "the turns are of another log: both are taken to count from the same moment"
+            "the turns are from another log: both logs are assumed to start at the same moment"
         );
     }
 }

@@ -1,51 +1,51 @@
-//! How a receiver's fixes were understood.
+//! How a receiver's fixes were interpreted.
 
 use deepfusion_hint::count_of;
 
-/// How a receiver's fixes were understood, or which were left out.
+/// How a receiver's fixes were interpreted, or which were left out.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FixesNote {
-    /// How the speeds come about, and how sure they are.
+    /// The origin and the accuracy of the speeds.
     #[error(
-        "speeds {}, sure to {sigma_mps:.2} m/s in the middle",
+        "speeds {}, with a median standard deviation of {sigma_mps:.2} m/s",
         if *measured { "as the receiver measured them" } else { "from its positions, smoothed" }
     )]
     Speeds {
-        /// Whether enough fixes have one everywhere; else they follow from the positions, at least in parts.
+        /// Whether enough fixes have a speed everywhere; else speeds follow from the positions, at least in parts.
         measured: bool,
         /// The median of their standard deviations, m/s.
         sigma_mps: f64,
     },
-    /// Fixes without a neighbour in time, and moving ones without a speed among those that have one.
+    /// Fixes without a neighbour in time, and moving fixes without a speed although others have one.
     #[error(
-        "left out, as they stand alone, go back in time or lack the speed that others have: {lost} of {}",
+        "left out, as they are isolated, go back in time or lack the speed that others have: {lost} of {}",
         count_of(*fixes, "fix")
     )]
     Alone {
-        /// How many.
+        /// Number of fixes left out.
         lost: usize,
-        /// How many fixes there are.
+        /// Number of all fixes.
         fixes: usize,
     },
-    /// Fixes without a speed among those that have one, whose positions stand.
+    /// Fixes without a speed although others have one, whose positions do not change.
     #[error(
-        "taken to stand, as they have no speed and their positions do: {standing} of {}",
+        "taken as standing, as they have no speed and do not change position: {standing} of {}",
         count_of(*fixes, "fix")
     )]
     Standing {
-        /// How many.
+        /// Number of fixes taken as standing.
         standing: usize,
-        /// How many fixes there are.
+        /// Number of all fixes.
         fixes: usize,
     },
     /// Which of GnssLogger's `Fix` rows are read.
     #[error(
         "speeds of the Fix rows of {}",
-        if *of_satellites { "satellites alone (GPS)" } else { "any provider: none is of satellites alone" }
+        if *of_satellites { "the GPS provider" } else { "any provider: none is from GPS alone" }
     )]
     FixRows {
-        /// Whether those of satellites alone; else there are none, and networks have their part in all.
+        /// Whether only those from GPS alone are read; if not, there are none, and network positions affect all fixes.
         of_satellites: bool,
     },
 }
@@ -64,30 +64,27 @@ mod tests {
         for (note, said) in [
             (
                 speeds(true),
-                "speeds as the receiver measured them, sure to 0.12 m/s in the middle",
+                "speeds as the receiver measured them, with a median standard deviation of 0.12 m/s",
             ),
             (
                 speeds(false),
-                "speeds from its positions, smoothed, sure to 0.12 m/s in the middle",
+                "speeds from its positions, smoothed, with a median standard deviation of 0.12 m/s",
             ),
             (
                 FixesNote::Alone { lost: 1, fixes: 12 },
-                "left out, as they stand alone, go back in time or lack the speed that others have: 1 of 12 fixes",
+                "left out, as they are isolated, go back in time or lack the speed that others have: 1 of 12 fixes",
             ),
             (
                 FixesNote::Standing {
                     standing: 2,
                     fixes: 12,
                 },
-                "taken to stand, as they have no speed and their positions do: 2 of 12 fixes",
+                "taken as standing, as they have no speed and do not change position: 2 of 12 fixes",
             ),
-            (
-                fix_rows(true),
-                "speeds of the Fix rows of satellites alone (GPS)",
-            ),
+            (fix_rows(true), "speeds of the Fix rows of the GPS provider"),
             (
                 fix_rows(false),
-                "speeds of the Fix rows of any provider: none is of satellites alone",
+                "speeds of the Fix rows of any provider: none is from GPS alone",
             ),
         ] {
             assert_eq!(note.to_string(), said);

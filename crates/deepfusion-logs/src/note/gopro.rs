@@ -1,30 +1,30 @@
-//! How a GoPro's metadata was understood.
+//! How a GoPro's metadata was interpreted.
 
 use deepfusion_hint::count_of;
 
-/// How a GoPro's metadata was understood, or what of it has no speed.
+/// How a GoPro's metadata was interpreted, or what of it has no speed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GoproNote {
-    /// The speeds are those of its receiver.
+    /// The speeds are those of the camera's GPS.
     #[error(
         "speeds of the camera's GPS, {} on the video's own clock",
         count_of(*readings, "reading")
     )]
     Gps {
-        /// How many.
+        /// Number of speeds.
         readings: usize,
     },
-    /// The receiver had no position for a while.
+    /// The GPS had no position for a while.
     #[error(
         "{without} of {} of the video {} no GPS fix and no speed",
         count_of(*stretches, "stretch"),
         if *without == 1 { "has" } else { "have" }
     )]
     NoFix {
-        /// In how many stretches.
+        /// Number of stretches without a position.
         without: usize,
-        /// How many there are, of about a second each.
+        /// Number of all stretches, of about a second each.
         stretches: usize,
     },
 }

@@ -1,9 +1,9 @@
-//! How a table was understood.
+//! How a table was interpreted.
 
 use crate::units::SpeedUnit;
 use deepfusion_hint::count_of;
 
-/// How a table was understood, or what of it was left out.
+/// How a table was interpreted, or what was left out.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableNote {
@@ -12,17 +12,17 @@ pub enum TableNote {
     Column {
         /// The header of the column of times.
         time: String,
-        /// That of the column of speeds.
+        /// The header of the column of speeds.
         speed: String,
         /// The speeds' unit.
         unit: SpeedUnit,
     },
-    /// Rows of one name hold the speeds.
+    /// Rows with one name hold the speeds.
     #[error("time from column '{time}', speed from the rows of '{name}' in {unit}")]
     Rows {
         /// The header of the column of times.
         time: String,
-        /// What the rows measured.
+        /// The name of these rows.
         name: String,
         /// The speeds' unit.
         unit: SpeedUnit,
@@ -32,15 +32,15 @@ pub enum TableNote {
     Positions {
         /// The header of the column of times.
         time: String,
-        /// That of the latitudes.
+        /// The header of the column of latitudes.
         latitude: String,
-        /// That of the longitudes.
+        /// The header of the column of longitudes.
         longitude: String,
     },
     /// The header is repeated among the rows.
-    #[error("the header stands {} more among the rows", times(*more))]
+    #[error("the header is repeated {} among the rows", times(*more))]
     HeaderAgain {
-        /// How many times.
+        /// Number of repetitions.
         more: usize,
     },
     /// Rows without a speed.
@@ -50,21 +50,21 @@ pub enum TableNote {
         if *absent == 1 { "holds no speed and is" } else { "hold no speed and are" }
     )]
     NoSpeed {
-        /// How many.
+        /// Number of rows without a speed.
         absent: usize,
-        /// Of so many that could have one.
+        /// Number of rows that could have one.
         rows: usize,
     },
-    /// Rows of the same time as the one above.
+    /// Rows with the same time as the one above.
     #[error(
         "{repeated} of {} {} left out",
         count_of(*rows, "row"),
         if *repeated == 1 { "repeats the time of the row above and is" } else { "repeat the time of the row above and are" }
     )]
     Repeated {
-        /// How many.
+        /// Number of such rows.
         repeated: usize,
-        /// Of so many that could have a speed.
+        /// Number of rows that could have a speed.
         rows: usize,
     },
     /// Rows that go back in time.
@@ -74,32 +74,32 @@ pub enum TableNote {
         if *back == 1 { "goes back in time and is" } else { "go back in time and are" }
     )]
     Backwards {
-        /// How many.
+        /// Number of such rows.
         back: usize,
-        /// Of so many that could be used.
+        /// Number of rows that could be used.
         rows: usize,
     },
-    /// Rows whose time is after that of the rows that follow.
+    /// Rows whose time is later than that of the rows that follow.
     #[error(
         "{ahead} of {} {} left out",
         count_of(*rows, "row"),
-        if *ahead == 1 { "leaps ahead in time and is" } else { "leap ahead in time and are" }
+        if *ahead == 1 { "jumps ahead in time and is" } else { "jump ahead in time and are" }
     )]
     Ahead {
-        /// How many.
+        /// Number of such rows.
         ahead: usize,
-        /// Of so many that could be used.
+        /// Number of rows that could be used.
         rows: usize,
     },
-    /// Rows whose latitude or longitude is none.
+    /// Rows whose latitude or longitude is invalid.
     #[error(
-        "left out, as their degrees are none: {beyond} of {}",
+        "left out, as they have no valid latitude and longitude: {beyond} of {}",
         count_of(*rows, "row")
     )]
     NoDegrees {
-        /// How many.
+        /// Number of such rows.
         beyond: usize,
-        /// How many rows the table has.
+        /// Number of rows in the table.
         rows: usize,
     },
     /// A column of yaw rates whose unit is not known.
@@ -108,17 +108,17 @@ pub enum TableNote {
         not_known(unit.as_deref())
     )]
     YawRateUnit {
-        /// Its header.
+        /// Header of the column.
         column: String,
-        /// The unit, where the header says one.
+        /// The unit in the header, if it has one.
         unit: Option<String>,
     },
     /// A column holds the yaw rates.
     #[error(
-        "yaw rate from column '{column}', taken to be positive to the left: change its sign where it is not"
+        "yaw rate from column '{column}', taken as positive to the left: if it is not, change its sign"
     )]
     YawRate {
-        /// Its header.
+        /// Header of the column.
         column: String,
     },
 }
@@ -133,7 +133,7 @@ fn times(count: usize) -> String {
 fn not_known(unit: Option<&str>) -> String {
     match unit {
         Some(unit) => format!("its unit '{unit}' is not known"),
-        None => "nothing says its unit".to_owned(),
+        None => "it has no unit".to_owned(),
     }
 }
 
@@ -175,7 +175,7 @@ mod tests {
                     column: "yaw rate".into(),
                     unit: None,
                 },
-                "column 'yaw rate' is left out, as nothing says its unit: name it yaw_rate_radps or yaw_rate_dps (positive to the left)",
+                "column 'yaw rate' is left out, as it has no unit: name it yaw_rate_radps or yaw_rate_dps (positive to the left)",
             ),
             (
                 TableNote::YawRateUnit {
@@ -189,7 +189,7 @@ mod tests {
                 TableNote::YawRate {
                     column: "yaw_rate_dps".into(),
                 },
-                "yaw rate from column 'yaw_rate_dps', taken to be positive to the left: change its sign where it is not",
+                "yaw rate from column 'yaw_rate_dps', taken as positive to the left: if it is not, change its sign",
             ),
         ] {
             assert_eq!(note.to_string(), said);
@@ -202,7 +202,7 @@ mod tests {
         for (note, said) in [
             (
                 TableNote::HeaderAgain { more: 3 },
-                "the header stands 3 times more among the rows",
+                "the header is repeated 3 times among the rows",
             ),
             (
                 TableNote::NoSpeed { absent: 2, rows },
@@ -236,18 +236,18 @@ mod tests {
                     ahead: 1,
                     rows: 200,
                 },
-                "1 of 200 rows leaps ahead in time and is left out",
+                "1 of 200 rows jumps ahead in time and is left out",
             ),
             (
                 TableNote::Ahead {
                     ahead: 2,
                     rows: 200,
                 },
-                "2 of 200 rows leap ahead in time and are left out",
+                "2 of 200 rows jump ahead in time and are left out",
             ),
             (
                 TableNote::NoDegrees { beyond: 1, rows: 1 },
-                "left out, as their degrees are none: 1 of 1 row",
+                "left out, as they have no valid latitude and longitude: 1 of 1 row",
             ),
         ] {
             assert_eq!(note.to_string(), said);

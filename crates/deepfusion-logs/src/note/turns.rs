@@ -1,36 +1,36 @@
-//! How a gyroscope was understood.
+//! How a gyroscope was interpreted.
 
-/// How a gyroscope was understood of which nobody knows how it is mounted, or why it was not.
+/// How a gyroscope with an unknown mounting was interpreted, or why it was not used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TurnsNote {
-    /// There is none, or nothing that says which way is up.
-    #[error("no gyroscope with an accelerometer beside it: how the vehicle turned is unknown")]
+    /// There is no gyroscope, or no accelerometer to find which way is up.
+    #[error("no gyroscope with an accelerometer: how the vehicle turned is unknown")]
     NoGyroscope,
     /// The accelerations are without gravity.
     #[error(
-        "the accelerations beside the gyroscope hold no gravity: which way is up, and so how the vehicle turned, is unknown"
+        "the accelerations do not include gravity: which way is up, and so how the vehicle turned, is unknown"
     )]
     NoGravity,
-    /// Gravity says which way is up.
+    /// Gravity gives the direction of up.
     #[error("yaw rate from the gyroscope about gravity's axis; {0}")]
     AboutGravity(TurnSign),
 }
 
-/// What says that turns to the left are positive.
+/// How the sign of the turns was determined, positive to the left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TurnSign {
-    /// Nothing does.
+    /// It could not be determined.
     #[error(
-        "taken for positive to the left, as the course of the satellites does not decide it: check the turns against the images"
+        "taken as positive to the left, as the GPS course does not decide the sign: compare the turns with the images"
     )]
     Assumed,
-    /// The course, with which the readings agree.
-    #[error("its sign agrees with the course of the satellites")]
+    /// The readings agree with the course.
+    #[error("its sign agrees with the GPS course")]
     Agrees,
-    /// The course, with which the readings agree once their sign is changed.
-    #[error("its sign is turned round, to agree with the course of the satellites")]
+    /// The readings agree with the course after a change of sign.
+    #[error("its sign is reversed to agree with the GPS course")]
     TurnedRound,
 }
 
@@ -44,20 +44,19 @@ mod tests {
         for (note, said) in [
             (
                 TurnsNote::NoGravity,
-                "the accelerations beside the gyroscope hold no gravity: which way is up, and so how the vehicle turned, is unknown",
+                "the accelerations do not include gravity: which way is up, and so how the vehicle turned, is unknown",
             ),
             (
                 about(TurnSign::Assumed),
-                "yaw rate from the gyroscope about gravity's axis; taken for positive to the left, as the course of the satellites does not \
-                 decide it: check the turns against the images",
+                "yaw rate from the gyroscope about gravity's axis; taken as positive to the left, as the GPS course does not decide the sign: compare the turns with the images",
             ),
             (
                 about(TurnSign::Agrees),
-                "yaw rate from the gyroscope about gravity's axis; its sign agrees with the course of the satellites",
+                "yaw rate from the gyroscope about gravity's axis; its sign agrees with the GPS course",
             ),
             (
                 about(TurnSign::TurnedRound),
-                "yaw rate from the gyroscope about gravity's axis; its sign is turned round, to agree with the course of the satellites",
+                "yaw rate from the gyroscope about gravity's axis; its sign is reversed to agree with the GPS course",
             ),
         ] {
             assert_eq!(note.to_string(), said);

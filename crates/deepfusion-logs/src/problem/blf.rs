@@ -1,83 +1,83 @@
-//! What is wrong with a binary log of Vector's.
+//! What is wrong with a Vector binary log.
 
 use deepfusion_hint::count_of;
 
-/// What is wrong with a binary log of Vector's.
+/// What is wrong with a Vector binary log.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BlfProblem {
-    /// It does not begin as one.
-    #[error("no binary log of Vector's begins so")]
+    /// The file does not begin with the format's mark.
+    #[error("not a Vector binary log (BLF)")]
     NoLog,
-    /// Its header has a size that no header has.
-    #[error("a header of {}", count_of(*.0, "byte"))]
+    /// The size of the file's header is impossible.
+    #[error("invalid header size: {}", count_of(*.0, "byte"))]
     Header(usize),
-    /// It is shorter than its header says.
-    #[error("the header says {}, the file has {bytes}", count_of(*stated, "byte"))]
+    /// The file is shorter than its header says.
+    #[error("the header gives a length of {}, the file has {bytes}", count_of(*stated, "byte"))]
     Length {
-        /// The length in its header.
+        /// The length in its header, bytes.
         stated: u64,
-        /// Its length.
+        /// Its actual length, bytes.
         bytes: u64,
     },
-    /// Its date is none.
+    /// The date in its header is invalid.
     #[error(
-        "{0:?} is no date (year, month, day of the week, day, hour, minute, second, millisecond)"
+        "{0:?} is not a date (year, month, day of the week, day, hour, minute, second, millisecond)"
     )]
     Date([u16; 8]),
-    /// It ends before what is being read.
+    /// The file ends before the end of what is being read.
     #[error("the file ends after {left} of {}", count_of(*count, "byte"))]
     Cut {
-        /// How many bytes are left.
+        /// Number of bytes left.
         left: u64,
-        /// How many there should be.
+        /// Number of bytes expected.
         count: usize,
     },
-    /// It ends within an object.
+    /// The file ends within an object.
     #[error("the file ends within an object")]
     ObjectCut,
-    /// Something else stands where an object should begin.
+    /// There is no object where one should begin.
     #[error("no object begins here")]
     NoObject,
-    /// An object has a size that no object has.
-    #[error("an object of {}", count_of(*.0, "byte"))]
+    /// The size of an object is impossible.
+    #[error("invalid object size: {}", count_of(*.0, "byte"))]
     Object(usize),
     /// A container is too short for its own header.
-    #[error("{}", count_of(*.0, "byte"))]
+    #[error("too short for its header: {}", count_of(*.0, "byte"))]
     Container(usize),
-    /// A container says that it holds more than is believed.
-    #[error("it says that it holds {0} bytes")]
+    /// The stated content of a container is larger than accepted.
+    #[error("its stated content of {0} bytes is too large")]
     TooLarge(usize),
-    /// A container's content cannot be unpacked.
+    /// A container's content cannot be decompressed.
     #[error("zlib: {0}")]
     Zlib(#[source] std::io::Error),
-    /// A container is compressed in a way that is not read.
-    #[error("compression {0}; 0 (none) and 2 (zlib) are known")]
+    /// A container is compressed with an unknown method.
+    #[error("unknown compression {0}, expected 0 (none) or 2 (zlib)")]
     Compression(u16),
-    /// A container's content has another size than it says.
-    #[error("it holds {} and says {stated}", count_of(*bytes, "byte"))]
+    /// A container's content has another size than its header says.
+    #[error("its content has {}, its header says {stated}", count_of(*bytes, "byte"))]
     ContainerSize {
-        /// How many bytes came out.
+        /// Size of the content, bytes.
         bytes: usize,
-        /// The size it says.
+        /// The size in its header, bytes.
         stated: usize,
     },
-    /// An object of a container's content cannot be read.
-    #[error("at byte {at} of what it holds: {problem}")]
+    /// An object in a container's content cannot be read.
+    #[error("at byte {at} of its content: {problem}")]
     Within {
-        /// Where, counted in the content; below 0 in that of the container before.
+        /// Position in the content; below 0 in that of the container before.
         at: i64,
-        /// What is wrong there.
+        /// What is wrong with the object.
         problem: Box<BlfProblem>,
     },
     /// A CAN frame is too short.
-    #[error("a CAN frame of {}", count_of(*.0, "byte"))]
+    #[error("a CAN frame of {} is too short", count_of(*.0, "byte"))]
     Frame(usize),
-    /// A time is counted in an unknown unit.
-    #[error("a time in unit {0}; 1 (10 µs) and 2 (1 ns) are known")]
+    /// A time has an unknown unit.
+    #[error("unknown time unit {0}, expected 1 (10 µs) or 2 (1 ns)")]
     TimeUnit(u32),
-    /// A time has more nanoseconds than can be counted.
-    #[error("a time of more than 292 years")]
+    /// A time has more nanoseconds than an `i64` holds.
+    #[error("a time beyond 292 years")]
     TooLate,
     /// An identifier is too large for a standard frame's.
     #[error("identifier {0:X} has more than 11 bits")]

@@ -7,20 +7,20 @@ use deepfusion_hint::count_of;
 #[non_exhaustive]
 pub enum SignalProblem {
     /// There is no DBC file.
-    #[error("nothing says what its frames hold: a DBC file does")]
+    #[error("a DBC file that describes its frames is needed")]
     NoDbc,
     /// No signal was named.
-    #[error("nothing says which signal is the speed{}", by_name(candidates))]
+    #[error("it is not known which signal is the speed{}", by_name(candidates))]
     NoName {
-        /// Signals of the DBC file that are called a speed.
+        /// Signals of the DBC file whose name contains speed.
         candidates: Vec<String>,
     },
     /// The signal's unit is not one of speed.
-    #[error("the DBC file's unit of {signal}, '{unit}', is not one of speed")]
+    #[error("the unit of {signal} in the DBC file, '{unit}', is not a unit of speed")]
     Unit {
         /// The signal's name.
         signal: String,
-        /// The unit, as the file has it.
+        /// The unit as in the file.
         unit: String,
     },
 }
@@ -29,7 +29,7 @@ fn by_name(candidates: &[String]) -> String {
     if candidates.is_empty() {
         String::new()
     } else {
-        format!("; by their names: {}", candidates.join(", "))
+        format!("; candidates: {}", candidates.join(", "))
     }
 }
 
@@ -37,27 +37,27 @@ fn by_name(candidates: &[String]) -> String {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CanFrameProblem {
-    /// Its time is none.
+    /// The frame's time is invalid.
     #[error("'{0}' is not a time in seconds")]
     Time(String),
-    /// Its identifier is not a number.
+    /// The frame's identifier is not a number.
     #[error("'{0}' is not an identifier")]
     Identifier(String),
-    /// Its identifier is too large for a standard frame's.
+    /// The identifier of a standard frame is too large.
     #[error("identifier {0:X} has more than 11 bits")]
     LongIdentifier(u32),
-    /// It has fewer bytes than it says.
-    #[error("{}, its length says {length}", count_of(*bytes, "byte"))]
+    /// The frame has fewer bytes than its length field says.
+    #[error("it has {}, its length field says {length}", count_of(*bytes, "byte"))]
     Length {
-        /// How many it has.
+        /// Number of bytes.
         bytes: usize,
-        /// How many it says.
+        /// The length in the frame, bytes.
         length: usize,
     },
-    /// A byte is none.
+    /// A byte is invalid.
     #[error("'{0}' is not a byte")]
     Byte(String),
-    /// Its bytes are none.
+    /// The bytes of data are invalid.
     #[error("'{0}' are not bytes")]
     Bytes(String),
 }

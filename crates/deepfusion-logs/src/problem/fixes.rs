@@ -6,47 +6,47 @@ use quick_xml::events::attributes::AttrError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpxProblem {
-    /// It is no XML: what the parser said.
+    /// The file is not valid XML; the parser's error.
     #[error(transparent)]
     Xml(#[from] quick_xml::Error),
-    /// An attribute is no XML: what the parser said.
+    /// An attribute is not valid XML; the parser's error.
     #[error(transparent)]
     Attribute(#[from] AttrError),
-    /// It has no element `gpx`.
-    #[error("no such element: it is no GPX file")]
+    /// The file has no element `gpx`.
+    #[error("no such element: not a GPX file")]
     NoGpx,
-    /// It ends within a point.
-    #[error("the file ends within it")]
+    /// The file ends inside a point.
+    #[error("the file ends inside it")]
     Cut,
     /// A point lacks a coordinate.
-    #[error("the point has none")]
+    #[error("missing in this point")]
     NoCoordinate,
-    /// A coordinate is none.
-    #[error("'{text}' is no angle up to {most} degrees")]
+    /// A coordinate is invalid.
+    #[error("'{text}' is not an angle of at most {most} degrees")]
     Angle {
-        /// What stands there.
+        /// The text of the attribute.
         text: String,
-        /// The largest angle.
+        /// The largest valid angle, degrees.
         most: f64,
     },
-    /// A time is none: what the parser said.
+    /// A time is invalid.
     #[error("'{text}': {source}")]
     Time {
-        /// What stands there.
+        /// The text of the element.
         text: String,
-        /// Why it is none.
+        /// The parser's error.
         source: jiff::Error,
     },
-    /// A time has more nanoseconds since 1970 than can be counted.
-    #[error("'{text}' is beyond 2262")]
+    /// A time has more nanoseconds since 1970 than an `i64` holds.
+    #[error("'{text}' is after the year 2262")]
     TooLate {
         /// The time as written.
         text: String,
     },
-    /// A speed is none.
-    #[error("'{text}' is no speed in m/s")]
+    /// A speed is invalid.
+    #[error("'{text}' is not a speed in m/s")]
     Speed {
-        /// What stands there.
+        /// The text of the element.
         text: String,
     },
 }
@@ -55,21 +55,21 @@ pub enum GpxProblem {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NmeaProblem {
-    /// The file has none.
-    #[error("no sentence in it ($GPRMC,…)")]
+    /// The file has no sentence.
+    #[error("the file has no NMEA sentence ($GPRMC,…)")]
     NoSentence,
-    /// What the parser said, whose own error borrows the sentence.
+    /// The parser's message; its error itself borrows the sentence.
     #[error("{0}")]
     Sentence(String),
-    /// Its checksum differs.
+    /// The checksum of a sentence is wrong.
     #[error("the checksum is {found:02X}, not {said:02X}")]
     Checksum {
-        /// That of its letters.
+        /// The checksum of its characters.
         found: u8,
-        /// The one it says.
+        /// The checksum written in it.
         said: u8,
     },
-    /// Its date has more nanoseconds since 1970 than can be counted.
-    #[error("its date is beyond 2262")]
+    /// The date has more nanoseconds since 1970 than an `i64` holds.
+    #[error("its date is after the year 2262")]
     TooLate,
 }

@@ -2,40 +2,40 @@
 
 use deepfusion_hint::count_of;
 
-/// How an MP4 file's boxes contradict each other.
+/// How the boxes of an MP4 file contradict each other.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Mp4Problem {
-    /// The box that holds all others is missing.
-    #[error("no such box: the recording was cut off, or this is no MP4 file")]
+    /// The box that contains all others is missing.
+    #[error("no such box: the recording was cut off, or this is not an MP4 file")]
     NoMovie,
     /// A box is missing.
     #[error("no such box")]
     NoBox,
-    /// A box is shorter than what it holds.
+    /// A box is shorter than its content.
     #[error("it ends early")]
     Cut,
-    /// A box is longer than the one it lies in.
-    #[error("{name}: {}, where {left} are left", count_of(*size, "byte"))]
+    /// A box is longer than the one that contains it.
+    #[error("{name}: size {}, but only {left} are left", count_of(*size, "byte"))]
     Size {
-        /// The box's name.
+        /// Name of the box.
         name: String,
-        /// The size it says.
+        /// The size in its header, bytes.
         size: u64,
-        /// How many bytes there are.
+        /// Number of bytes left.
         left: usize,
     },
-    /// A track's clock stands still.
-    #[error("a timescale of 0")]
+    /// The timescale of a track is 0.
+    #[error("the timescale is 0")]
     Timescale,
     /// There are more samples than a file of its size can hold.
-    #[error("more samples than bytes")]
+    #[error("more samples than the file has bytes")]
     Samples,
-    /// A sample lies where the file has no bytes.
-    #[error("a sample lies beyond the file's end: it was cut off")]
+    /// A sample lies beyond the end of the file.
+    #[error("a sample lies beyond the end of the file, which was cut off")]
     Beyond,
-    /// Fewer samples have a time than have a size.
-    #[error("fewer samples than stsz")]
+    /// Fewer samples have a time than a size.
+    #[error("fewer samples than in stsz")]
     Times,
 }
 
@@ -43,38 +43,38 @@ pub enum Mp4Problem {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpmfProblem {
-    /// It is longer than what it lies in.
-    #[error("{key}: {}, where {left} are left", count_of(*length, "byte"))]
+    /// An entry is longer than the data that contains it.
+    #[error("{key}: length {}, but only {left} are left", count_of(*length, "byte"))]
     Length {
-        /// Its key.
+        /// Key of the entry.
         key: String,
-        /// The length it says.
+        /// The length in its header, bytes.
         length: usize,
-        /// How many bytes there are.
+        /// Number of bytes left.
         left: usize,
     },
-    /// Its values are of a kind that is not a number.
-    #[error("{key}: values of kind '{kind}' are not numbers")]
+    /// The values of an entry are not numbers.
+    #[error("{key}: values of type '{kind}' are not numbers")]
     NoNumbers {
-        /// Its key.
+        /// Key of the entry.
         key: String,
-        /// The kind's letter.
+        /// Letter of the values' type.
         kind: char,
     },
-    /// Its values are of several kinds, and no entry before it says which.
+    /// The values of an entry have several types, and no entry before it lists them.
     #[error("{key}: no TYPE before it")]
     NoType {
-        /// Its key.
+        /// Key of the entry.
         key: String,
     },
-    /// Its readings are not of the numbers they should be.
-    #[error("{key}: readings of {bytes} bytes, expected {least} numbers")]
+    /// The readings of an entry have too few numbers.
+    #[error("{key}: readings of {bytes} bytes, expected at least {least} numbers")]
     Readings {
-        /// Its key.
+        /// Key of the entry.
         key: String,
-        /// Bytes of a reading.
+        /// Size of a reading, bytes.
         bytes: usize,
-        /// The fewest numbers that a reading has.
+        /// Least number of numbers in a reading.
         least: usize,
     },
 }

@@ -6,15 +6,15 @@ use deepfusion_hint::count_of;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableProblem {
-    /// It is not parted into values as it should be: what the parser said.
+    /// The row cannot be split into values; the parser's error.
     #[error(transparent)]
     Csv(#[from] csv::Error),
-    /// It has another number of values than the header.
+    /// The row has another number of values than the header.
     #[error("{}, the header has {named}", count_of(*values, "value"))]
     Values {
-        /// How many it has.
+        /// Number of values in the row.
         values: usize,
-        /// How many the header names.
+        /// Number of values in the header.
         named: usize,
     },
     /// A value is not a number.
@@ -23,32 +23,32 @@ pub enum TableProblem {
         /// The value, shortened.
         text: String,
     },
-    /// A value is no time.
+    /// A value is not a time.
     #[error("'{text}' is not a time")]
     NotATime {
         /// The value, shortened.
         text: String,
     },
-    /// Its time is before that of the row above.
+    /// The row's time is before that of the row above.
     #[error("'{text}' is {back_s} s before the row above")]
     Backwards {
         /// The time as written, shortened.
         text: String,
-        /// By how much, in seconds.
+        /// Difference from the row above, in seconds.
         back_s: f64,
     },
     /// The time of a fix is before that of the fix above.
     #[error("{back_s} s before the fix above")]
     FixBackwards {
-        /// By how much, in seconds.
+        /// Difference from the fix above, in seconds.
         back_s: f64,
     },
-    /// The values of a place are no angles of the globe.
-    #[error("{latitude}, {longitude} are no degrees of latitude and longitude")]
+    /// The values of a position are not angles on the globe.
+    #[error("{latitude}, {longitude} is not a latitude and longitude in degrees")]
     NoDegrees {
-        /// What should be its latitude.
+        /// The value in the latitude's column.
         latitude: f64,
-        /// What should be its longitude.
+        /// The value in the longitude's column.
         longitude: f64,
     },
 }

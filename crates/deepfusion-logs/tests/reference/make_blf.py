@@ -18,7 +18,7 @@ FRAMES = list(can.CanutilsLogReader(HERE / "candump.log"))
 
 
 class TenMicroseconds(can.BLFWriter):
-    """CAN_MESSAGE2 and CAN_FD_MESSAGE_64 by turns, below a header of version 2, with times of 10 µs."""
+    """CAN_MESSAGE2 and CAN_FD_MESSAGE_64 alternately, after a header of version 2, with times of 10 µs."""
 
     def on_message_received(self, msg):
         identifier = msg.arbitration_id | (blf.CAN_MSG_EXT if msg.is_extended_id else 0)

@@ -105,7 +105,7 @@ def car_scanner():
 
 
 def sensor_logger():
-    """The phone hangs askew, and its platform's gravity points down: the sign of a turn has to be found."""
+    """The phone is mounted askew, and its platform's gravity points down: the sign of a turn has to be found."""
     up = np.array([0.2, 0.9, 0.3])
     up /= np.linalg.norm(up)
     ns = lambda t: int(START.timestamp()) * 10**9 + round(t * 1e9)
@@ -145,7 +145,7 @@ def gnss_logger():
 
 
 def table():
-    """Anybody's: German numbers, a local date, knots in a column of its own name."""
+    """A table of an unknown program: German numbers, a local date, knots in a column of its own name."""
     lines = ["Zeitpunkt;Fahrt;Bemerkung"]
     for t in times(5):
         stamp = when(t).strftime("%d.%m.%Y %H:%M:%S.") + f"{int(when(t).microsecond / 1000):03d}"
@@ -231,7 +231,7 @@ def gpmf():
         box("stco", full, u32(n, *offsets)),
     )
     media = box("mdia", box("mdhd", full, u32(0, 0, 1001, n * 1001), bytes(4)), box("hdlr", full, bytes(4), b"meta", bytes(13)), box("minf", table))
-    # What is the same for the whole video, and what the lens saw.
+    # Settings of the whole video, and of its lens.
     text = lambda key, value: klv(key, "c", 1, len(value), value.encode())
     settings = nest("DEVC", text("DVNM", "Global Settings") + text("MINF", "HERO11 Black") + text("DZOM", "Y") + klv("DZST", "L", 4, 1, u32(0)) + klv("VRES", "L", 4, 2, u32(1920, 1080)))
     lens = nest("DEVC", text("DVNM", "Large FOV") + klv("ZFOV", "f", 4, 1, struct.pack(">f", 94.0)) + text("VFOV", "L"))

@@ -13,9 +13,9 @@ use crate::{Error, ModelProblem};
 pub struct TensorInfo {
     /// Its name.
     pub name: String,
-    /// Its dimensions; `None` for one that the model leaves open.
+    /// Its dimensions; `None` for one that the model does not fix.
     pub shape: Vec<Option<usize>>,
-    /// Whether it holds 32-bit floats.
+    /// Whether its numbers are 32-bit floats.
     pub f32: bool,
 }
 
@@ -24,7 +24,7 @@ pub struct TensorInfo {
 pub struct Tensor {
     /// Dimensions.
     pub shape: Vec<usize>,
-    /// As many as their product.
+    /// The numbers, as many as the product of the dimensions.
     pub data: Vec<f32>,
 }
 
@@ -40,25 +40,25 @@ impl ForeignModel {
     ///
     /// # Errors
     /// As [`super::find`]; [`Error::Library`] if this process already uses another library, [`Error::Runtime`]
-    /// for a model that the library refuses.
+    /// for a model that the library does not accept.
     pub fn load(library: Option<&Path>, model: &[u8], threads: usize) -> Result<Self, Error> {
         let (session, library) = session(library, model, threads)?;
         Ok(Self { session, library })
     }
 
-    /// The library it runs in.
+    /// Path of the library it runs in.
     #[must_use]
     pub fn library(&self) -> &Library {
         &self.library
     }
 
-    /// Its inputs.
+    /// Descriptions of its inputs.
     #[must_use]
     pub fn inputs(&self) -> Vec<TensorInfo> {
         self.session.inputs().iter().map(info).collect()
     }
 
-    /// Its outputs.
+    /// Descriptions of its outputs.
     #[must_use]
     pub fn outputs(&self) -> Vec<TensorInfo> {
         self.session.outputs().iter().map(info).collect()
@@ -94,7 +94,7 @@ impl ForeignModel {
             .map_err(|e| refused(RUN, e))?;
         let tensor = |(_, value): (&str, ort::value::ValueRef<'_>)| {
             let values = value.try_extract_tensor::<f32>();
-            let (shape, values) = values.map_err(|e| refused("give its output", e))?;
+            let (shape, values) = values.map_err(|e| refused("return its output", e))?;
             Ok(Tensor {
                 shape: shape.iter().map(|d| (*d).max(0) as usize).collect(),
                 data: values.to_vec(),

@@ -12,7 +12,7 @@ use crate::{Error, LibraryProblem};
 /// A usable ONNX Runtime library.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Library {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
     /// Its version, such as `1.31.1`.
     pub version: String,
@@ -47,18 +47,18 @@ pub fn find(asked: Option<&Path>) -> Result<Library, Error> {
     Err(first_failure.unwrap_or(Error::NoLibrary { searched }))
 }
 
-/// Opens a library and asks for its version.
+/// Opens a library and reads its version.
 fn open(path: &Path) -> Result<Library, Error> {
     let fail = |reason| Error::Library {
         path: path.to_owned(),
         reason,
     };
-    // A name without a folder would be searched for by the system; a path never is.
+    // The system would search for a name without a folder, but never for a path.
     let file = std::path::absolute(path).map_err(|e| fail(LibraryProblem::Refused(e.into())))?;
     if !file.is_file() {
         return Err(fail(LibraryProblem::Missing));
     }
-    // SAFETY: opening a library runs its initialisers; the file is one that the user named or that bears
+    // SAFETY: opening a library runs its initialisers; the file is one that the user named or that has
     // ONNX Runtime's name in a folder of installed programs.
     let library = unsafe { libloading::Library::new(&file) };
     let library = library.map_err(|e| fail(LibraryProblem::Refused(e.into())))?;
@@ -66,13 +66,13 @@ fn open(path: &Path) -> Result<Library, Error> {
     let entry: Result<Symbol<unsafe extern "C" fn() -> *const OrtApiBase>, _> =
         unsafe { library.get(b"OrtGetApiBase") };
     let entry = entry.map_err(|_| fail(LibraryProblem::NoEntryPoint))?;
-    // SAFETY: it takes nothing and gives a pointer to a constant, or null.
+    // SAFETY: it takes no arguments and returns a pointer to a constant, or null.
     let base = unsafe { entry().as_ref() };
     let base = base.ok_or_else(|| fail(LibraryProblem::EmptyEntryPoint))?;
     // SAFETY: as ONNX Runtime documents it, a text that lives as long as the library.
     let version = unsafe { CStr::from_ptr((base.GetVersionString)()) };
     let version = version.to_string_lossy().into_owned();
-    // SAFETY: any number may be asked for; null is the answer for one that it does not know.
+    // SAFETY: any version may be requested; the answer for an unknown one is null.
     let known = !unsafe { (base.GetApi)(ort::MINOR_VERSION) }.is_null();
     if !known || !is_new_enough(&version) {
         let oldest = ort::MINOR_VERSION;
@@ -81,7 +81,7 @@ fn open(path: &Path) -> Result<Library, Error> {
             oldest,
         }));
     }
-    // It stays open: it is wanted now, and threads of a library must not outlive its code.
+    // The library stays open: it is needed next, and its threads must not outlive its code.
     std::mem::forget(library);
     Ok(Library {
         path: file,
@@ -89,7 +89,7 @@ fn open(path: &Path) -> Result<Library, Error> {
     })
 }
 
-/// As the binding compares them, by the second number of `1.x.y`.
+/// The second number of `1.x.y`, by which the binding compares versions.
 fn is_new_enough(version: &str) -> bool {
     let minor = version.split('.').nth(1).and_then(|n| n.parse().ok());
     minor.is_some_and(|minor: u32| minor >= ort::MINOR_VERSION)

@@ -32,12 +32,12 @@ static ENVIRONMENT: Mutex<Option<(Library, Environment)>> = Mutex::new(None);
 impl OrtEngine {
     /// Loads a model as [`crate::write()`] makes it.
     ///
-    /// `library` is the ONNX Runtime library; without it, the one in use is taken, or one is [found](find).
-    /// `threads` is the number of CPU threads of a run; 0 leaves it to ONNX Runtime.
+    /// `library` is the ONNX Runtime library; without it, the one in use is taken, or one is [searched for](find).
+    /// `threads` is the number of CPU threads per run; 0 leaves it to ONNX Runtime.
     ///
     /// # Errors
     /// As [`find`]; [`Error::Library`] if this process already uses another library, [`Error::Runtime`]
-    /// for a model that the library refuses, [`Error::Model`] for one that is not a depth model.
+    /// for a model that the library does not accept, [`Error::Model`] for one that is not a depth model.
     pub fn load(library: Option<&Path>, model: &[u8], threads: usize) -> Result<Self, Error> {
         let (session, library) = session(library, model, threads)?;
         let (width, height) = size_of(&session)?;
@@ -49,7 +49,7 @@ impl OrtEngine {
         })
     }
 
-    /// The library it runs in.
+    /// Path of the library it runs in.
     #[must_use]
     pub fn library(&self) -> &Library {
         &self.library
@@ -95,7 +95,7 @@ impl OrtEngine {
         Ok(maps)
     }
 
-    /// Only the outputs asked for are computed.
+    /// Runs the model; only the requested outputs are computed.
     fn outputs<const N: usize>(
         &mut self,
         rgb: &[u8],
@@ -121,7 +121,7 @@ impl OrtEngine {
             };
             let values = outputs.get(name).ok_or_else(missing)?;
             let values = values.try_extract_tensor::<f32>();
-            let (_, values) = values.map_err(|e| refused("give its output", e))?;
+            let (_, values) = values.map_err(|e| refused("return its output", e))?;
             check_length("an output", pixels, values.len())?;
             check_length("a buffer", pixels, buffer.len())?;
             buffer.copy_from_slice(values);
@@ -148,7 +148,7 @@ fn check_length(what: &'static str, expected: usize, found: usize) -> Result<(),
     })
 }
 
-/// Width and height of the one input, a picture of bytes.
+/// Width and height of the only input, a picture of bytes.
 fn size_of(session: &Session) -> Result<(usize, usize), Error> {
     let size = match session.inputs() {
         [input] if input.name() == "image" => match input.dtype().tensor_shape().map(|s| &s[..]) {
@@ -165,7 +165,7 @@ fn size_of(session: &Session) -> Result<(usize, usize), Error> {
     })
 }
 
-/// A session for a model, and the library that it is in; `threads` as for [`OrtEngine::load`].
+/// A session for a model, and the library it runs in; `threads` as for [`OrtEngine::load`].
 fn session(
     library: Option<&Path>,
     model: &[u8],
@@ -173,7 +173,7 @@ fn session(
 ) -> Result<(Session, Library), Error> {
     let (library, environment) = environment(library)?;
     let builder = Session::builder(&environment);
-    let mut builder = builder.map_err(|e| refused("make a session", e))?;
+    let mut builder = builder.map_err(|e| refused("create a session", e))?;
     if threads > 0 {
         builder = builder
             .with_intra_threads(threads)
@@ -184,7 +184,7 @@ fn session(
     Ok((session, library))
 }
 
-/// Opens the library, or gives the one that is open.
+/// Opens the library, or returns the one that is open.
 fn environment(asked: Option<&Path>) -> Result<(Library, Environment), Error> {
     let mut open = ENVIRONMENT.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((library, environment)) = &*open {

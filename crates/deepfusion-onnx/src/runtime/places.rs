@@ -1,4 +1,4 @@
-//! Folders that may hold an ONNX Runtime library. They are only listed: nothing is started.
+//! Folders that may contain an ONNX Runtime library. They are only listed: no program is started.
 
 use std::collections::HashSet;
 use std::env;
@@ -32,7 +32,7 @@ pub(super) fn folders() -> Vec<PathBuf> {
     all
 }
 
-/// Libraries in a folder, the newest first, by their names.
+/// Libraries in a folder, the newest version first, according to their names.
 pub(super) fn libraries_in(folder: &Path) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = entries(folder)
         .filter(|path| {
@@ -45,8 +45,8 @@ pub(super) fn libraries_in(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// `libonnxruntime.so`, `libonnxruntime.so.1.31.1`, `libonnxruntime.1.31.1.dylib`, `onnxruntime.dll`; not the
-/// libraries of its providers beside it.
+/// `libonnxruntime.so`, `libonnxruntime.so.1.31.1`, `libonnxruntime.1.31.1.dylib`, `onnxruntime.dll`; but not the
+/// libraries of its providers in the same folder.
 fn is_library(name: &str) -> bool {
     let digits = |text: &str| text.chars().all(|c| c.is_ascii_digit() || c == '.');
     if cfg!(windows) {
@@ -71,8 +71,8 @@ fn numbers(path: &Path) -> Vec<u32> {
         .collect()
 }
 
-/// Folders in which Pythons are installed: the active environment, those whose `python` is on `PATH`, what
-/// their links lead to, and the user's own.
+/// Folders in which Python is installed: the active environment, those whose `python` is on `PATH`, the
+/// targets of their links, and the user's own.
 fn python_prefixes() -> Vec<PathBuf> {
     let named = ["VIRTUAL_ENV", "CONDA_PREFIX"].into_iter();
     let mut prefixes: Vec<PathBuf> = named.filter_map(env::var_os).map(PathBuf::from).collect();
@@ -83,7 +83,7 @@ fn python_prefixes() -> Vec<PathBuf> {
             if !program.is_file() {
                 continue;
             }
-            // On Windows `python.exe` lies in the prefix itself, elsewhere in its `bin`.
+            // On Windows `python.exe` is in the prefix itself, elsewhere in its `bin`.
             let prefix = |program: &Path| {
                 let folder = program.parent()?;
                 let folder = if cfg!(windows) {
@@ -118,7 +118,7 @@ fn wheel_folders(prefix: &Path) -> Vec<PathBuf> {
     capi.filter(|folder| folder.is_dir()).collect()
 }
 
-/// What is in a folder; nothing where it cannot be read.
+/// The entries of a folder; none if it cannot be read.
 fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     let entries = std::fs::read_dir(folder).into_iter().flatten();
     entries.filter_map(|entry| Some(entry.ok()?.path()))

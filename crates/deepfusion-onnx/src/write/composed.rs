@@ -1,4 +1,4 @@
-//! Operations of ours that are several of ONNX's.
+//! Operations of ours that consist of several ONNX operations.
 
 use deepfusion_infer::ValueId;
 
@@ -40,7 +40,7 @@ impl Writer {
         )
     }
 
-    /// Whole, and then cut where the larger size is an odd number of pixels.
+    /// Enlarges, then crops if the larger size is an odd number of pixels.
     pub(super) fn depth_to_space(&mut self, name: &str, input: ValueId) -> Result<String, Error> {
         let [_, height, width] = self.shapes[self.values.len()];
         let [_, small_height, small_width] = self.shapes[input.0];
@@ -61,7 +61,7 @@ impl Writer {
         self.emit("Slice", name, &[&whole, &starts, &ends, &axes], vec![])
     }
 
-    /// The nine neighbours of each pixel by a convolution that picks one each, times the softmax of their weights.
+    /// The nine neighbours of each pixel, found by a convolution that picks one each, times the softmax of their weights.
     pub(super) fn convex(
         &mut self,
         name: &str,
@@ -111,7 +111,7 @@ impl Writer {
         reshape(self, &turned, name, &[1, 1, side * height, side * width])
     }
 
-    /// Spelt out: `LayerNormalization` knows the last axes alone.
+    /// Written as single operations: `LayerNormalization` supports only the last axes.
     pub(super) fn channel_norm(
         &mut self,
         name: &str,
@@ -195,7 +195,7 @@ impl Writer {
         self.emit("Reshape", name, &[&mixed, &whole], vec![])
     }
 
-    /// Rows to length 1.
+    /// Scales rows to length 1.
     fn unit(&mut self, x: &str) -> Result<String, Error> {
         let squares = self.emit("Mul", &format!("{x}.square"), &[x, x], vec![])?;
         let axis = self.shared(TensorProto::ints("last", &[-1]))?;

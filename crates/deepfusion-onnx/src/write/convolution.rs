@@ -1,4 +1,4 @@
-//! Convolutions with what follows them: a residual, an activation.
+//! Convolutions with a residual or an activation after them.
 
 use deepfusion_infer::{Activation, Border, Conv, Depthwise};
 
@@ -81,7 +81,7 @@ impl Writer {
         )
     }
 
-    /// x·½·(1 + erf(x/√2)), spelt out: this operator set has no `Gelu`, and ONNX Runtime makes one operation of it.
+    /// x·½·(1 + erf(x/√2)), as single operations: this operator set has no `Gelu`, and ONNX Runtime fuses them into one.
     fn gelu(&mut self, name: &str, x: &str) -> Result<String, Error> {
         let root = TensorProto::floats("root", &[], &[std::f32::consts::SQRT_2]);
         let (root, one) = (self.shared(root)?, TensorProto::floats("one", &[], &[1.0]));
@@ -94,8 +94,8 @@ impl Writer {
         self.emit("Mul", &format!("{name}.gelu"), &[&y, &half], vec![])
     }
 
-    /// 1 / (1 + e⁻ˣ), spelt out: ONNX Runtime's `Sigmoid` is off by up to 1.4e-7 where it should be 0, which
-    /// is 1e-4 of the depth at 90 m. This is as exact there as anywhere, for one channel's work.
+    /// 1 / (1 + e⁻ˣ), as single operations: ONNX Runtime's `Sigmoid` is off by up to 1.4e-7 where it should be 0, which
+    /// is 1e-4 of the depth at 90 m. This is equally exact everywhere, for the work of one channel.
     fn sigmoid(&mut self, name: &str, x: &str) -> Result<String, Error> {
         let one = self.shared(TensorProto::floats("one", &[], &[1.0]))?;
         let x = self.emit("Neg", &format!("{name}.negative"), &[x], vec![])?;

@@ -39,7 +39,7 @@ pub(crate) fn conv(
     let taps = channels_in * kernel * kernel;
     let scale = 2.0 / (taps as f32).sqrt();
     let border = random.pick(&[Border::Zero, Border::Reflect]);
-    // A reflected border is no wider than what it mirrors.
+    // A reflected border is at most as wide as what it mirrors.
     let dilation = match border {
         Border::Zero => random.pick(&[1, 1, 2, 5]),
         Border::Reflect => 1,
@@ -67,7 +67,7 @@ pub(crate) fn conv(
     }
 }
 
-/// A 1×1 of a single pixel.
+/// A 1×1 convolution of a single pixel.
 fn point(random: &mut Random, graph: &Graph, input: ValueId, channels_out: usize) -> Op {
     let channels_in = graph.shape(input).channels;
     let mut weights = |n: usize| (0..n).map(|_| random.signed()).collect::<Vec<_>>();
@@ -86,7 +86,7 @@ fn point(random: &mut Random, graph: &Graph, input: ValueId, channels_out: usize
     }))
 }
 
-/// Masks from a value, a convolution with a pixel added everywhere, and the last operation of all: its gate.
+/// Masks from a value, a convolution with a pixel added everywhere, and the network's last operation: its gate.
 fn attended(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> Op {
     let push =
         |part: &str, op: Op, graph: &mut Graph| graph.push(format!("{name}.{part}"), op).unwrap();
@@ -108,7 +108,7 @@ fn attended(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> O
     }
 }
 
-/// Each channel by a kernel of its own.
+/// Each channel with its own kernel.
 fn depthwise(random: &mut Random, graph: &Graph, input: ValueId) -> Op {
     let channels = graph.shape(input).channels;
     let kernel = random.pick(&[1, 3, 5]);
@@ -129,10 +129,10 @@ fn depthwise(random: &mut Random, graph: &Graph, input: ValueId) -> Op {
     }))
 }
 
-/// Normalised channels with the pixels' places, and the last operation of all: attention between them.
+/// Normalised channels with the pixels' positions, and the network's last operation: attention between them.
 fn mixed(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> Op {
     let mut push = |part: &str, op: Op| graph.push(format!("{name}.{part}"), op).unwrap();
-    // Of at least two channels: one alone is always at its mean.
+    // With at least two channels: a single one always equals its mean.
     let normed = push(
         "norm",
         Op::ChannelNorm {
@@ -159,7 +159,7 @@ fn mixed(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> Op {
     }
 }
 
-/// A gated unit's step from a value, and the last operation of all: its new state.
+/// A step of a gated unit from a value, and the network's last operation: its new state.
 fn gated(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> Op {
     let channels = graph.shape(x).channels;
     let mut layer = |part: &str, input: ValueId, activation: Activation, graph: &mut Graph| {
@@ -183,7 +183,7 @@ fn gated(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> Op {
     }
 }
 
-/// A value's first step to the image's size by weights, and the last operation of all.
+/// A value's first step to the image's size with learned weights, and the network's last operation.
 fn enlarged_by_weights(
     random: &mut Random,
     graph: &mut Graph,
@@ -206,7 +206,7 @@ fn enlarged_by_weights(
     }
 }
 
-/// A network of every operation, in an order and with connections that the seed decides.
+/// A network of every operation, in an order and with connections given by the seed.
 pub(crate) fn model(seed: u64) -> DepthModel {
     let mut random = Random(seed);
     let r = &mut random;

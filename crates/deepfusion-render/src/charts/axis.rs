@@ -16,7 +16,7 @@ pub(super) const COLOURS: [&str; 6] = [
 
 /// A chart as part of a page.
 pub trait Svg {
-    /// The chart as an SVG element that needs nothing from outside.
+    /// The chart as an SVG element that needs no external resources.
     fn to_svg(&self) -> String;
 }
 
@@ -59,7 +59,7 @@ pub(super) fn draw_y_axis(svg: &mut String, y: &AxisScale) {
     }
 }
 
-/// The line at the bottom and what runs along it.
+/// The line at the bottom with its labels.
 pub(super) fn draw_x_line(svg: &mut String, label: &str) {
     let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
     let _ = write!(
@@ -71,7 +71,7 @@ pub(super) fn draw_x_line(svg: &mut String, label: &str) {
     );
 }
 
-/// Names beside their colours. One series needs no key: the title says what it is.
+/// Names beside their colours. One series needs no legend: the title names it.
 pub(super) fn draw_key(svg: &mut String, names: &[&str]) {
     if names.len() < 2 {
         return;
@@ -93,7 +93,7 @@ pub(super) fn draw_key(svg: &mut String, names: &[&str]) {
 
 /// Values to pixels, along one axis.
 pub(super) struct AxisScale {
-    /// Ends in values, or in their decimal logarithms.
+    /// Both ends in values, or in their decimal logarithms.
     low: f64,
     high: f64,
     pixels: (f64, f64),
@@ -101,7 +101,7 @@ pub(super) struct AxisScale {
 }
 
 impl AxisScale {
-    /// Over all usable values; `None` without any.
+    /// An axis over all usable values; `None` without any.
     pub(super) fn over(
         values: impl Iterator<Item = f64>,
         from: f64,
@@ -132,7 +132,7 @@ impl AxisScale {
 
     pub(super) fn with_margin(mut self) -> Self {
         let margin = 0.06 * (self.high - self.low);
-        // Loss curves stay above zero: don't show an axis that goes below it.
+        // Loss curves stay above zero, so the axis does not go below it.
         let keeps_sign = !self.log && self.low >= 0.0;
         self.low = if keeps_sign {
             (self.low - margin).max(0.0)
@@ -146,7 +146,7 @@ impl AxisScale {
     pub(super) fn pixel(&self, value: f64) -> Option<f64> {
         let value = if self.log { value.log10() } else { value };
         let place = (value - self.low) / (self.high - self.low);
-        // A hair beyond the ends is rounding.
+        // A tiny overshoot of the ends is rounding.
         (place.is_finite() && (-1e-6..=1.0 + 1e-6).contains(&place))
             .then_some(self.pixels.0 + place * (self.pixels.1 - self.pixels.0))
     }
@@ -188,7 +188,7 @@ impl AxisScale {
 /// A number with as many decimals as ticks `step` apart need.
 fn label(value: f64, step: f64) -> String {
     let decimals = (-(step.log10() + 1e-9).floor()).max(0.0) as usize;
-    // 2.5-steps need one more.
+    // Steps of 2.5 need one more.
     let more = usize::from((step / 10f64.powf(step.log10().floor()) - 2.5).abs() < 0.01);
     let text = format!("{value:.*}", decimals + more);
     if text.contains('.') {

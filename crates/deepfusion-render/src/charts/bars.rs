@@ -16,7 +16,7 @@ pub struct BarChart {
 }
 
 impl BarChart {
-    /// A chart with named groups and no bars yet.
+    /// A chart with named groups, without bars yet.
     #[must_use]
     pub fn new(
         title: impl Into<String>,
@@ -31,7 +31,7 @@ impl BarChart {
         }
     }
 
-    /// Adds a bar to each group, from 0 up; `None` and values that are negative or not finite leave a gap.
+    /// Adds a bar to each group, from 0 upwards; `None` and values that are negative or not finite leave a gap.
     #[must_use]
     pub fn bars(mut self, name: impl Into<String>, values: Vec<Option<f64>>) -> Self {
         self.series.push((name.into(), values));
@@ -49,7 +49,7 @@ impl Svg for BarChart {
             svg.push_str(r#"<text x="320" y="140" text-anchor="middle">no values</text></svg>"#);
             return svg;
         }
-        // The numbers above the bars need room.
+        // The numbers above the bars need space.
         let ends = [0.0, 1.08 * tallest].into_iter();
         let Some(y) = AxisScale::over(ends, HEIGHT - BOTTOM, TOP, false) else {
             return svg;

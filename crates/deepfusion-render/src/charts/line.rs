@@ -28,19 +28,19 @@ impl Series {
 /// Lines over a number, such as losses over steps, as a self-contained inline SVG.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineChart {
-    /// What it shows.
+    /// Title of the chart.
     pub title: String,
     /// Label of the x axis.
     pub x_label: String,
     /// The lines.
     pub series: Vec<Series>,
-    /// A dashed horizontal line and its name, such as the scale ratio 1.
+    /// A dashed horizontal line with its name, such as the scale ratio 1.
     pub reference: Option<(f64, String)>,
-    /// Whether y is shown by its logarithm; values that are not positive are then left out.
+    /// Whether y has a logarithmic scale; values that are not positive are then left out.
     pub log_y: bool,
 }
 
-/// More points than pixels say nothing more.
+/// More points than there are pixels would not be visible.
 const MOST_POINTS: usize = 500;
 impl LineChart {
     /// A chart without lines yet.
@@ -69,7 +69,7 @@ impl LineChart {
         self
     }
 
-    /// Shows y by its logarithm.
+    /// Gives y a logarithmic scale.
     #[must_use]
     pub fn log_y(mut self) -> Self {
         self.log_y = true;

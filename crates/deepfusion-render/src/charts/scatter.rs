@@ -5,10 +5,10 @@ use super::axis::{
 };
 use crate::html::escape;
 
-/// More dots than this say nothing more: an even selection is drawn.
+/// Most dots that are drawn, as more would not be visible: an even selection.
 const MOST_DOTS: usize = 1500;
 
-/// Dots of one number over another, on equal axes with the diagonal: predicted against true, observed against expected.
+/// A dot for each pair of numbers, on equal axes with the diagonal: predicted over true, observed over expected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScatterChart {
     title: String,
@@ -33,7 +33,7 @@ impl ScatterChart {
         }
     }
 
-    /// Few points, drawn large.
+    /// Draws large dots, for few points.
     #[must_use]
     pub fn large(mut self) -> Self {
         self.large = true;

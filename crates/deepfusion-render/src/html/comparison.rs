@@ -5,7 +5,7 @@ use deepfusion_eval::compare::{Rank, Table, Tables};
 use super::{Cell, HtmlReport, Mark};
 
 impl HtmlReport {
-    /// Adds tables of evaluations, a section each: the best and second of each column marked, doubtful rows with their reasons.
+    /// Adds tables of evaluations, a section each. The best and second best of each column are marked, implausible rows have their reasons.
     #[must_use]
     pub fn comparison(mut self, tables: &Tables) -> Self {
         for note in &tables.notes {
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
     use deepfusion_eval::compare::{Better, Column, Row, published_tables};
 
-    /// Nothing from outside, and every element that is opened is closed.
+    /// No external resources, and every element that is opened is closed.
     fn check_page(html: &str) {
         for outside in [
             "http://", "https://", "src=\"/", "@import", "<script", "<link",

@@ -12,11 +12,11 @@ use crate::{
     shrink_depth, sparse_depth_picture, with_depth_legend,
 };
 
-/// Pictures of frames are at most this wide: two stand beside each other in a page of 1,030 units.
+/// Pictures of frames are at most this wide: two stand side by side on a page of 1,030 units.
 const WIDEST: u32 = 640;
 /// Size of the views of clouds.
 const CLOUD_SIZE: (u32, u32) = (640, 400);
-/// Farther points are left out of clouds.
+/// More distant points are left out of clouds.
 const CLOUD_DEPTH_M: f32 = 60.0;
 
 /// A frame shown in a report.
@@ -24,7 +24,7 @@ const CLOUD_DEPTH_M: f32 = 60.0;
 pub struct ShownFrame {
     /// Its heading: the reason for showing it, its name, its score.
     pub title: String,
-    /// The image; black where there is none.
+    /// The image; black without one.
     pub image: Option<RgbImage>,
     /// Predicted depth at the truth's size, metres, 0 where there is none.
     pub prediction: DepthMap,
@@ -50,10 +50,10 @@ impl ShownFrame {
 }
 
 impl HtmlReport {
-    /// Image, prediction, ground truth and error of a frame, two beside each other.
+    /// Image, prediction, ground truth and error of a frame, two side by side.
     ///
     /// # Errors
-    /// [`crate::Error::Size`] where prediction and truth differ in size, [`crate::Error::Encode`].
+    /// [`crate::Error::Size`] if prediction and truth differ in size, [`crate::Error::Encode`].
     pub fn frame(self, frame: &ShownFrame) -> Result<Self> {
         let scale = DepthScale::default();
         let size = frame.picture_size();
@@ -78,7 +78,7 @@ impl HtmlReport {
             )
     }
 
-    /// Predicted and true points of a frame, from above and behind and as a map. Nothing without a camera of the truth's
+    /// Predicted and true points of a frame, from above and behind and as a map. Adds nothing without a camera of the truth's
     /// size.
     ///
     /// # Errors
@@ -101,7 +101,7 @@ impl HtmlReport {
             (CloudView::birds_eye(), "from straight above, 10 m grid"),
         ] {
             for (depth, what) in [(&frame.prediction, "Predicted"), (&frame.truth, "True")] {
-                // The sizes were compared above; without points there is nothing to see.
+                // The sizes were compared above; without points there is nothing to draw.
                 if let Ok(cloud) = PointCloud::from_depth(depth, &k, rgb, CLOUD_DEPTH_M) {
                     let picture = render_cloud(&cloud, &view, CLOUD_SIZE.0, CLOUD_SIZE.1);
                     let caption = format!("{what} points, {place}");

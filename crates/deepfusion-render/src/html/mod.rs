@@ -1,4 +1,4 @@
-//! A report as one HTML file that works offline: styles, pictures and charts are inside.
+//! A report as a single HTML file that works offline: styles, pictures and charts are inside.
 
 mod comparison;
 mod frames;

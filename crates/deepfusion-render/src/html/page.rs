@@ -58,14 +58,14 @@ impl HtmlReport {
         }
     }
 
-    /// For wide tables: as wide as the window, up to 1,400 units.
+    /// Makes the page as wide as the window, up to 1,400 units, for wide tables.
     #[must_use]
     pub fn wide(mut self) -> Self {
         self.wide = true;
         self
     }
 
-    /// The key figures in large type: name and value.
+    /// Adds the key figures in large type: name and value.
     #[must_use]
     pub fn facts(mut self, facts: &[(&str, &str)]) -> Self {
         self.body.push_str(r#"<div class="facts">"#);
@@ -98,14 +98,14 @@ impl HtmlReport {
         self
     }
 
-    /// Small print.
+    /// Adds a note in small print.
     #[must_use]
     pub fn note(mut self, text: &str) -> Self {
         let _ = write!(self.body, r#"<p class="note">{}</p>"#, escape(text));
         self
     }
 
-    /// Small print, numbered from 1.
+    /// Adds notes in small print, numbered from 1.
     #[must_use]
     pub fn list(mut self, items: &[String]) -> Self {
         self.body.push_str(r#"<ol class="note">"#);
@@ -116,7 +116,7 @@ impl HtmlReport {
         self
     }
 
-    /// Properties, one per line: name and value.
+    /// Adds properties, one per line: name and value.
     #[must_use]
     pub fn properties(mut self, rows: &[(String, String)]) -> Self {
         self.body
@@ -129,7 +129,7 @@ impl HtmlReport {
         self
     }
 
-    /// A table with marked cells: the best bold, the second underlined, doubtful ones grey with a sign.
+    /// Adds a table with marked cells: the best bold, the second best underlined, implausible ones grey with a sign.
     #[must_use]
     pub fn marked_table(mut self, header: &[&str], rows: &[Vec<Cell>]) -> Self {
         self.body.push_str(&tables::marked(header, rows));
@@ -157,7 +157,7 @@ impl HtmlReport {
         self
     }
 
-    /// A chart. Charts that follow each other stand side by side where there is room.
+    /// Adds a chart. Consecutive charts stand side by side if there is space.
     #[must_use]
     pub fn chart(mut self, chart: &impl Svg) -> Self {
         let _ = write!(
@@ -176,7 +176,7 @@ impl HtmlReport {
         self.figure("", caption, picture, format)
     }
 
-    /// A picture of half the page's width: two that follow each other stand side by side where there is room.
+    /// Adds a picture of half the page's width: two consecutive ones stand side by side if there is space.
     ///
     /// # Errors
     /// As [`HtmlReport::picture`].
@@ -204,7 +204,7 @@ impl HtmlReport {
         Ok(self)
     }
 
-    /// Pictures in rows, the columns of all rows alike: each with its caption, stored as JPEG. Short rows leave gaps.
+    /// Adds pictures in rows with equal columns: each with its caption, stored as JPEG. Short rows leave gaps.
     ///
     /// # Errors
     /// As [`HtmlReport::picture`].

@@ -10,7 +10,7 @@ use crate::{BarChart, LearningLog, LineChart, ScatterChart, histogram};
 /// Points of a training curve: more would show the noise of single batches.
 const CURVE_POINTS: usize = 80;
 
-/// What is written above a curve, per column of `log.csv`; other columns go by their own name.
+/// The title of a curve for each column of `log.csv`; other columns use their own name.
 const TITLES: [(&str, &str); 13] = [
     ("total", "Total loss"),
     ("reprojection", "Photometric reprojection"),
@@ -32,7 +32,7 @@ const TITLES: [(&str, &str); 13] = [
 pub struct ReliabilityBin {
     /// The bin's middle confidence, 0 to 1.
     pub confidence: f64,
-    /// Mean relative error that the confidence stands for.
+    /// Mean relative error that the confidence predicts.
     pub expected: f64,
     /// Mean relative error against ground truth.
     pub observed: f64,
@@ -41,7 +41,7 @@ pub struct ReliabilityBin {
 }
 
 impl HtmlReport {
-    /// Curves of every column of the log, training and held out. Terms that are zero throughout are named instead.
+    /// Adds curves of every column of the log, training and validation. Terms that are zero throughout are only listed.
     /// `images_a_step` converts images per second into seconds per step.
     #[must_use]
     pub fn learning(mut self, log: &LearningLog, images_a_step: Option<f64>) -> Self {
@@ -59,7 +59,7 @@ impl HtmlReport {
         self
     }
 
-    /// Unscaled errors of the ranges, as bars.
+    /// Adds bars of the unscaled errors by range.
     #[must_use]
     pub fn range_charts(self, report: &Report) -> Self {
         let chart = |title: &str, value: fn(&deepfusion_eval::RangeBin) -> Option<f64>| {
@@ -74,7 +74,7 @@ impl HtmlReport {
             .chart(&chart("RMSE by range, m, unscaled", |r| r.rmse))
     }
 
-    /// Scale ratio and error of every evaluated frame, in order.
+    /// Adds scale ratio and error of every evaluated frame, in order.
     #[must_use]
     pub fn frame_charts(self, images: &[ImageScore]) -> Self {
         let curve = |value: &dyn Fn(&ImageScore) -> f64| -> Vec<(f64, f64)> {
@@ -96,7 +96,7 @@ impl HtmlReport {
         )
     }
 
-    /// Drawn points against their true places: the table by range, coordinates, distances.
+    /// Adds a comparison of predicted points with their true positions: the table by range, coordinates, distances.
     #[must_use]
     pub fn points(mut self, points: &Points, drawn: &[DrawnPoint]) -> Self {
         let metres = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"));
@@ -168,7 +168,7 @@ impl HtmlReport {
         ))
     }
 
-    /// A reliability plot: observed over expected relative error, bin by bin.
+    /// Adds a reliability plot: observed over expected relative error, bin by bin.
     #[must_use]
     pub fn reliability(self, bins: &[ReliabilityBin]) -> Self {
         let rows: Vec<Vec<String>> = bins

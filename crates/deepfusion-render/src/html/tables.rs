@@ -12,7 +12,7 @@ pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> String {
 /// The mark of a table cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mark {
-    /// Nothing.
+    /// No mark.
     #[default]
     None,
     /// The best of its column: bold.
@@ -30,7 +30,7 @@ pub struct Cell {
     pub text: String,
     /// Its mark.
     pub mark: Mark,
-    /// Whether it is text, aligned on the left, rather than a number.
+    /// Whether it is text, aligned on the left, and not a number.
     pub words: bool,
 }
 
@@ -95,7 +95,7 @@ fn table_of_class(class: &str, header: &[&str], rows: &[Vec<String>]) -> String 
     out
 }
 
-/// All that a report says, as tables and sentences.
+/// All results of an evaluation, as tables and sentences.
 pub(super) fn evaluation(report: &Report) -> String {
     let mut out = table_of_class(
         "metrics",
@@ -169,7 +169,7 @@ fn metric_rows(report: &Report) -> Vec<Vec<String>> {
     if let Some(fixed) = &report.fixed_scaled {
         rows.push(row(&format!("scaled by {}", fixed.factor), &fixed.metrics));
     }
-    // Where nothing moves, the static row would only repeat the first.
+    // Without dynamic pixels, the static row would only repeat the first.
     if let Some(metrics) = &report.moving {
         if let Some(still) = &report.still {
             rows.push(row("static (labelled)", still));
@@ -192,22 +192,22 @@ fn metric_rows(report: &Report) -> Vec<Vec<String>> {
     rows
 }
 
-/// Metrics that truth without boundaries cannot provide have no row.
+/// Metrics that need boundaries in the truth have no row without them.
 fn sharp_rows(sharpness: &Sharpness) -> Vec<Vec<String>> {
     let px = |v: f64| format!("{v:.2} px");
     let percent = |v: f64| format!("{:.1} %", 100.0 * v);
     let row = |label: &str, value: Option<String>| value.map(|v| vec![label.to_owned(), v]);
     [
         row(
-            "depth boundaries: how far from the true ones (accuracy)",
+            "depth boundaries: distance to the true ones (accuracy)",
             sharpness.boundary_accuracy_px.map(px),
         ),
         row(
-            "depth boundaries: the same with those missed, each 10 px (completeness)",
+            "depth boundaries: the same, with missed ones counted as 10 px (completeness)",
             sharpness.boundary_completeness_px.map(px),
         ),
         row(
-            "flying pixels: at depth jumps, between the two sides",
+            "flying pixels: at depth jumps, with a depth between the two sides",
             sharpness.flying_share.map(percent),
         ),
     ]
@@ -216,7 +216,7 @@ fn sharp_rows(sharpness: &Sharpness) -> Vec<Vec<String>> {
     .collect()
 }
 
-/// What intervals of each level hold.
+/// Coverage and width of the intervals of each level.
 fn interval_rows(intervals: &Intervals) -> Vec<Vec<String>> {
     let whose = if intervals.in_sample {
         ", of the pixels they were calibrated on"

@@ -1,4 +1,4 @@
-//! What is said of depth without ground truth, on a page.
+//! The results for depth without ground truth, on a page.
 
 use deepfusion_eval::verdict::{Evidence, ScaleCertificate, SpeedRow, Verdict};
 use deepfusion_hint::count_of;
@@ -6,8 +6,8 @@ use deepfusion_hint::count_of;
 use super::HtmlReport;
 
 impl HtmlReport {
-    /// Adds a section with what is said of depth without ground truth: the scale and how sure it is, how well depth, images and motion fit
-    /// together, the scale by predicted depth, and speeds beside those measured.
+    /// Adds a section with the results for depth without ground truth: the scale and its uncertainty, how well depth, images and motion
+    /// agree, the scale by predicted depth, and speeds compared with the measured ones.
     #[must_use]
     pub fn verdict(self, verdict: &Verdict) -> Self {
         let found = &verdict.without_truth;
@@ -22,8 +22,7 @@ impl HtmlReport {
         };
         rows.extend(evidence_rows(found));
         let page = self.section("Without ground truth").properties(&rows).note(
-            "The scale follows from how far scene points move between frames while the vehicle drives a measured way. The frames are \
-             none that training saw.",
+            "The scale follows from how far scene points move between frames while the vehicle drives a measured distance. Training did not use these frames.",
         );
         add_speeds(add_ranges(page, found), found)
     }
@@ -87,7 +86,7 @@ fn evidence_rows(found: &Evidence) -> Vec<(String, String)> {
     rows
 }
 
-/// The scale by predicted depth.
+/// A table of the scale by predicted depth.
 fn add_ranges(page: HtmlReport, found: &Evidence) -> HtmlReport {
     if found.ranges.is_empty() {
         return page;
@@ -102,7 +101,7 @@ fn add_ranges(page: HtmlReport, found: &Evidence) -> HtmlReport {
     )
 }
 
-/// Speeds beside those measured, a column for each way to see them.
+/// A table of speeds compared with the measured ones, with a column for each way of estimating them.
 fn add_speeds(page: HtmlReport, found: &Evidence) -> HtmlReport {
     let ranges = found.speed_ranges();
     if ranges.is_empty() {
@@ -159,7 +158,7 @@ mod tests {
         assert!(!html.contains("predicted depth</th>") && !html.contains("pairs</th>"));
     }
 
-    /// Ways to see a speed that say nothing have no column.
+    /// A way of estimating speed that has no results has no column.
     #[test]
     fn speeds_have_a_column_for_each_way_to_see_them() {
         let mut verdict = Verdict::default();

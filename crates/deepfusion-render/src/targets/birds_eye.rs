@@ -6,17 +6,17 @@ use super::line::line;
 use crate::captioned::{INK, PAPER};
 use crate::text::{TextSize, draw_text};
 
-/// Free ground, and what stands on it.
+/// Colour of free ground, and of occupied ground.
 const FREE: Rgb<u8> = Rgb([226, 240, 226]);
 /// See [`FREE`].
 const OCCUPIED: Rgb<u8> = Rgb([120, 120, 128]);
-/// Lines every ten metres.
+/// Distance between lines: ten metres.
 const GRID: Rgb<u8> = Rgb([200, 204, 212]);
-/// How far an arrow shows, seconds of motion.
+/// Seconds of motion that an arrow shows.
 const ARROW_S: f64 = 1.0;
 
 /// The road from above, `ahead_m` metres from bottom to top: free and occupied ground, boxes with their numbers, and the
-/// positions of dynamic targets in a second. `width` × `height` pixels.
+/// positions of dynamic targets after one second. `width` × `height` pixels.
 #[must_use]
 pub fn birds_eye(
     ground: &Ground,
@@ -78,7 +78,7 @@ pub fn birds_eye(
             INK,
         );
     }
-    // The camera's own place, a wedge that looks up.
+    // The camera's own position: a wedge that points up.
     let foot = pixel(0.0, 0.0);
     for side in [-1.0, 1.0] {
         line(

@@ -29,7 +29,7 @@ pub(super) fn line(
     }
 }
 
-/// The part of a line that can touch the picture, so that a corner a kilometre away costs no kilometre of pixels
+/// The part of a line that can touch the picture, so that a corner a kilometre away does not cost a kilometre of pixels
 /// (Liang and Barsky).
 fn within(picture: &RgbImage, from: [f64; 2], to: [f64; 2]) -> Option<([f64; 2], [f64; 2])> {
     const MARGIN: f64 = 8.0;

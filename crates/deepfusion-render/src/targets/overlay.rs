@@ -10,7 +10,7 @@ use crate::text::{TextSize, draw_text, text_width};
 /// Nearest depth at which an edge is still drawn, metres.
 const NEAR_M: f64 = 0.3;
 
-/// The image with the targets' boxes, farthest first: the front face of a dynamic one is crossed, and above each is its
+/// The image with the targets' boxes, farthest first. The front face of a dynamic one is crossed; above each is its
 /// class (if known), number, distance and, if dynamic, speed.
 #[must_use]
 pub fn box_overlay(image: &RgbImage, k: &Intrinsics, targets: &[Target]) -> RgbImage {
@@ -45,7 +45,7 @@ fn draw_box(picture: &mut RgbImage, k: &Intrinsics, target: &Target, thickness: 
     }
 }
 
-/// Both ends of an edge in the image; cut off before the camera.
+/// Both ends of an edge in the image, clipped to the space before the camera.
 fn projected(k: &Intrinsics, mut a: Vector3<f64>, mut b: Vector3<f64>) -> Option<[[f64; 2]; 2]> {
     if a.z < NEAR_M && b.z < NEAR_M {
         return None;

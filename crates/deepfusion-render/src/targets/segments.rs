@@ -6,7 +6,7 @@ use super::colour_of;
 use crate::ColourMap;
 use crate::depth_picture::{from_pixels, percentile};
 
-/// Disparity in grey with each target's pixels in its colour, as bright as they are near (the paper's target-segmentation
+/// Disparity in grey with each target's pixels in its colour, the brighter the nearer (the paper's target-segmentation
 /// disparity). `detections` are those of the depth image that the targets come from.
 #[must_use]
 pub fn target_segments(depth: &DepthMap, targets: &[Target], detections: &[Detection]) -> RgbImage {

@@ -8,68 +8,68 @@ use std::io::{self, Read};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Why a chunk of an MCAP file cannot be read, or not all of it.
+/// Why a chunk of an MCAP file, or a part of it, cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChunkProblem {
-    /// It ends within its own head.
-    #[error("its head is cut off")]
+    /// The chunk ends within its header.
+    #[error("its header is cut off")]
     HeadCut,
-    /// Its end is missing.
+    /// The end of the chunk is missing.
     #[error(
         "{missing} of its {} {} missing",
         count_of(*stored, "byte"),
         if *missing == 1 { "is" } else { "are" }
     )]
     Cut {
-        /// How many bytes are missing.
+        /// Number of missing bytes.
         missing: u64,
-        /// How many there should be.
+        /// Number of bytes there should be.
         stored: u64,
     },
-    /// It is larger than a chunk may be.
-    #[error("{} unpacked, at most {MOST_BYTES} are read", count_of(*size, "byte"))]
+    /// The chunk is larger than allowed.
+    #[error("{} decompressed, the limit is {MOST_BYTES}", count_of(*size, "byte"))]
     TooLarge {
-        /// How many bytes it has unpacked.
+        /// Its decompressed size, bytes.
         size: u64,
     },
-    /// It is compressed in a way that is not read.
-    #[error("compression `{name}`: none, lz4 and zstd are read")]
+    /// The compression is unknown.
+    #[error("unknown compression `{name}`, expected none, lz4 or zstd")]
     Compression {
-        /// The compression's name.
+        /// Name of the compression.
         name: String,
     },
-    /// No decoder can be set up.
+    /// The decoder cannot be set up.
     #[error("{0}")]
     Decoder(#[source] io::Error),
-    /// It cannot be unpacked.
-    #[error("cannot be unpacked: {0}")]
+    /// The chunk cannot be decompressed.
+    #[error("cannot be decompressed: {0}")]
     Unpack(#[source] io::Error),
-    /// It has another length than its head says.
-    #[error("{} unpacked, its head says {stated}", count_of(*bytes, "byte"))]
+    /// The chunk has another length than its header says.
+    #[error("{} decompressed, its header says {stated}", count_of(*bytes, "byte"))]
     Length {
-        /// How many bytes came out.
+        /// Number of decompressed bytes.
         bytes: u64,
-        /// The length in its head.
+        /// The length in its header, bytes.
         stated: u64,
     },
-    /// Its checksum is another than its head's.
-    #[error("its checksum differs")]
+    /// The checksum differs from the header's.
+    #[error("its checksum is wrong")]
     Checksum,
-    /// A record in it is not whole.
-    #[error("unpacked, {0}")]
+    /// A record in the chunk is incomplete.
+    #[error("after decompression, {0}")]
     Record(#[source] RecordProblem),
-    /// It has a message before its first one.
+    /// The chunk has a message before its first one.
     #[error("a message at {time}, the index says the first is at {first}")]
     Early {
-        /// The message's time.
+        /// Time of the message.
         time: Time,
-        /// The first message's time by the index.
+        /// Time of the first message according to the index.
         first: Time,
     },
 }
 
-/// A chunk's records: in the file itself, or unpacked.
+/// A chunk's records: in the file itself, or decompressed.
 #[derive(Debug, Clone)]
 pub(super) enum Content<'a> {
     Stored(&'a [u8]),
@@ -90,11 +90,11 @@ impl Content<'_> {
 pub(super) struct Entry {
     pub time: Time,
     pub channel: u16,
-    /// Its own bytes.
+    /// The message's bytes, without its header.
     pub range: Range<usize>,
 }
 
-/// Decompresses the chunk whose record's content is `content`; on an error it returns what was read up to there, and the reason.
+/// Decompresses the chunk whose record's content is `content`; on an error it returns what was read before, and the reason.
 pub(super) fn open(content: &[u8]) -> (Content<'_>, Option<ChunkProblem>) {
     let Some(head) = ChunkHead::read(content) else {
         return (Content::Stored(&[]), Some(ChunkProblem::HeadCut));
@@ -135,7 +135,7 @@ pub(super) fn open(content: &[u8]) -> (Content<'_>, Option<ChunkProblem>) {
 
 fn unpack<'a>(decoder: impl Read, size: u64) -> Result<Content<'a>, (Vec<u8>, ChunkProblem)> {
     let mut bytes = Vec::new();
-    // One byte more than there should be, so that too many are seen; memory grows with what comes.
+    // Reads one byte more than expected, to notice a longer chunk; memory grows with the output.
     match decoder.take(size + 1).read_to_end(&mut bytes) {
         Ok(_) => Ok(Content::Unpacked(Arc::new(bytes))),
         Err(e) => Err((bytes, ChunkProblem::Unpack(e))),
@@ -161,7 +161,7 @@ pub(super) struct Walk<'a> {
     pub broken: Option<ChunkProblem>,
 }
 
-/// Goes through a chunk's records, up to the first that is not whole.
+/// Walks through a chunk's records, up to the first incomplete one.
 pub(super) fn walk(bytes: &[u8]) -> Walk<'_> {
     let mut walk = Walk::default();
     let mut at = 0;
@@ -194,7 +194,7 @@ pub(super) fn walk(bytes: &[u8]) -> Walk<'_> {
     }
 }
 
-/// The times of a channel's messages in one chunk, by a message index record.
+/// The times of a channel's messages in one chunk, from a message index record.
 pub(super) fn indexed_times(content: &[u8], channel: u16) -> Option<Vec<Time>> {
     let mut fields = Fields(content);
     if fields.u16()? != channel {

@@ -7,7 +7,7 @@ use std::fmt;
 /// What is wrong with an MCAP file that was scanned instead of opened by its summary.
 #[derive(Debug)]
 pub struct McapDamage {
-    /// In the order in which it was found; at least one.
+    /// The problems in the order in which they were found; at least one.
     pub problems: Vec<McapProblem>,
 }
 
@@ -20,43 +20,43 @@ impl fmt::Display for McapDamage {
 
 impl std::error::Error for McapDamage {}
 
-/// What is wrong with a place of an MCAP file.
+/// A problem at a position of an MCAP file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum McapProblem {
     /// The recorder was stopped before it wrote a summary.
-    #[error("the recorder did not finish the file, it has no summary")]
+    #[error("the recorder did not finish the file, which has no summary")]
     NoSummary,
-    /// Its end does not say where the summary is.
+    /// The end of the file does not give the position of the summary.
     #[error("the file's end is damaged")]
     End,
-    /// The summary should begin where it cannot.
-    #[error("the summary is damaged: it begins behind its end")]
+    /// The position of the summary is impossible.
+    #[error("the summary is damaged: its start is after its end")]
     SummaryPlace,
-    /// A record of the summary is not whole.
+    /// A record of the summary is incomplete.
     #[error("the summary is damaged: {0}")]
     SummaryCut(RecordProblem),
-    /// A record of the summary is not what the format says.
+    /// A record of the summary does not have the required form.
     #[error("the summary is damaged: the record at byte {at}")]
     SummaryRecord {
-        /// Where it begins.
+        /// Position of the record.
         at: usize,
     },
-    /// What describes a topic or its messages is cut off.
+    /// The definition of a topic or its messages is cut off.
     #[error("the definition at byte {at} is cut off")]
     Definition {
-        /// Where it begins, in the file or in its chunk.
+        /// Position of the definition, in the file or in its chunk.
         at: usize,
     },
-    /// A record is not whole.
+    /// A record is incomplete.
     #[error(transparent)]
     Record(RecordProblem),
-    /// A chunk cannot be read, or not all of it.
+    /// A chunk, or a part of it, cannot be read.
     #[error("the chunk at byte {at}: {problem}")]
     Chunk {
-        /// Where it begins.
+        /// Position of the chunk.
         at: usize,
-        /// What is wrong with it.
+        /// What is wrong with the chunk.
         problem: ChunkProblem,
     },
 }

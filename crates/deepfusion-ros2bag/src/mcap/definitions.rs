@@ -4,7 +4,7 @@ use super::record::{Fields, op};
 use crate::storage::Channel;
 use std::collections::HashMap;
 
-/// Schemas and channels, gathered from wherever they stand.
+/// Schemas and channels, collected from all parts of the file.
 #[derive(Debug, Default)]
 pub(super) struct Definitions {
     /// Type and definition by number.
@@ -19,7 +19,7 @@ impl Definitions {
         self.schemas.len()
     }
 
-    /// Adds a record; `None` if it is malformed. The first channel of a number counts.
+    /// Adds a record; `None` if it is malformed. The first channel with a number counts.
     pub(super) fn add(&mut self, op: u8, content: &[u8]) -> Option<()> {
         let mut fields = Fields(content);
         let id = fields.u16()?;

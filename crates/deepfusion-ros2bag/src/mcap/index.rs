@@ -1,4 +1,4 @@
-//! A file's summary, which is at its end.
+//! A file's summary, which is at the end of the file.
 
 use super::chunk::indexed_times;
 use super::damage::McapProblem;
@@ -8,7 +8,7 @@ use super::{ChunkInfo, Index};
 use crate::storage::hull;
 use deepfusion_rosbag::Time;
 
-/// Numbers of the statistics record that say whether the summary is complete.
+/// Numbers of the statistics record that show whether the summary is complete.
 struct Statistics {
     messages: u64,
     schemas: u64,
@@ -21,7 +21,8 @@ struct Statistics {
 /// Positions of a chunk's message indexes, by channel.
 struct Indexes(Vec<(u16, u64)>);
 
-/// The index from the summary; else the file has to be scanned, for what is wrong with the summary, if anything is.
+/// Reads the index from the summary. If that is not possible, the file has to be scanned; the error is what is wrong with the summary,
+/// if anything is.
 pub(super) fn read(bytes: &[u8]) -> Result<Index, Option<McapProblem>> {
     let tail = bytes.len().checked_sub(TAIL);
     let (Some(tail), true) = (tail, bytes.ends_with(MAGIC)) else {
@@ -68,7 +69,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Index, Option<McapProblem>> {
         }
         at = found.end();
     }
-    // Recorders may leave parts of the summary out; then nothing but the file itself tells.
+    // Recorders may leave parts of the summary out; then only the file itself has the information.
     let Some(statistics) = statistics else {
         return Err(None);
     };
@@ -76,7 +77,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Index, Option<McapProblem>> {
         && statistics.channels == definitions.channels.len() as u64
         && statistics.schemas == definitions.schemas() as u64
         && (statistics.messages == 0 || !chunks.is_empty());
-    // Without message indexes the times of a topic are found by unpacking chunk after chunk, of every topic: going through the file once is less.
+    // Without message indexes the times of a topic require decompressing all chunks: scanning the file once is less work.
     let indexed = chunks.iter().all(|chunk| chunk.channels.is_some());
     if !complete || !indexed {
         return Err(None);
@@ -122,14 +123,14 @@ fn chunk_index(bytes: &[u8], content: &[u8]) -> Option<(ChunkInfo, Indexes)> {
         to: found.end(),
         first: Time::from_nanos(first),
         last: Time::from_nanos(last),
-        // Without message indexes nothing says what is in it.
+        // Without message indexes it is unknown which channels are in it.
         channels: (!channels.is_empty()).then_some(channels),
         scanned: false,
     };
     (found.op == op::CHUNK).then_some((info, Indexes(indexes)))
 }
 
-/// Each channel's first and last time, by the message indexes of the few chunks that can hold them.
+/// Each channel's first and last time, from the message indexes of the few chunks that can hold them.
 fn set_ranges(bytes: &[u8], index: &mut Index, indexes: &[Indexes]) {
     let mut by_first: Vec<usize> = (0..index.chunks.len()).collect();
     let mut by_last = by_first.clone();

@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque, binary_heap::PeekMut};
 use std::sync::Arc;
 
-/// Memory: a chunk is unpacked shortly before its first message and released after its last; of each open chunk 40
+/// Memory: a chunk is decompressed shortly before its first message and released after its last; each open chunk takes 40
 /// bytes a message.
 pub(super) struct Messages<'a> {
     file: &'a McapFile,
@@ -22,7 +22,7 @@ pub(super) struct Messages<'a> {
     errors: VecDeque<Error>,
 }
 
-/// A chunk with messages left; ordered by the next of them, then by its place in the file.
+/// A chunk with messages left; ordered by the next of them, then by its position in the file.
 struct OpenChunk<'a> {
     next: (Time, usize),
     entries: std::vec::IntoIter<Entry>,
@@ -54,7 +54,7 @@ impl<'a> Messages<'a> {
         messages
     }
 
-    /// Opens what must be open to know the next message.
+    /// Opens the chunks that may have the next message.
     fn advance(&mut self) {
         while self.errors.is_empty() {
             let next = self.open.peek().map(|Reverse(chunk)| chunk.next.0);
@@ -74,13 +74,13 @@ impl<'a> Messages<'a> {
     fn open_chunk(&mut self, info: &'a ChunkInfo) {
         let (content, problem) = chunk::open(&self.file.bytes()[info.from..info.to]);
         let walk = chunk::walk(content.bytes());
-        // What is wrong with a scanned chunk is known since the scan.
+        // What is wrong with a scanned chunk was reported by the scan.
         if let Some(problem) = problem.or(walk.broken).filter(|_| !info.scanned) {
             return self.fail(info, problem);
         }
         let mut entries = walk.messages;
         if let Some(early) = entries.iter().find(|e| e.time < info.first) {
-            // It has come too late to keep the order.
+            // It comes too late to keep the order.
             let (time, first) = (early.time, info.first);
             return self.fail(info, ChunkProblem::Early { time, first });
         }
@@ -108,7 +108,7 @@ impl<'a> Messages<'a> {
     }
 }
 
-/// Those of messages in time order that lie in a selection's times. One image of many is asked for at a time: the others are not looked at.
+/// The messages, in time order, within the times of a selection. Often one image of many is requested, so the others are not visited.
 fn within<'a>(ordered: &'a [Entry], selection: &Selection) -> impl Iterator<Item = &'a Entry> {
     let from = ordered.partition_point(|entry| entry.time < selection.start());
     let rest = ordered[from..].iter();

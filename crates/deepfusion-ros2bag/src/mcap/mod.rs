@@ -1,6 +1,6 @@
 //! MCAP files, mapped. The format: <https://mcap.dev/spec>.
 //!
-//! The reader is our own: the `mcap` crate copies every chunk and stops at the first problem.
+//! This crate has its own reader, as the `mcap` crate copies every chunk and stops at the first problem.
 
 mod chunk;
 mod damage;
@@ -36,14 +36,14 @@ enum Bytes {
     Empty,
 }
 
-/// What is in a file, and where.
+/// The content of a file, with positions.
 #[derive(Debug, Default)]
 struct Index {
     channels: Vec<Channel>,
-    /// From a channel's number to its place in `channels`.
+    /// Maps a channel's number to its index in `channels`.
     places: HashMap<u16, usize>,
     chunks: Vec<ChunkInfo>,
-    /// Messages outside of chunks, in time order, by place in the file.
+    /// Messages outside chunks, in time order, by position in the file.
     loose: Vec<Entry>,
     problems: Vec<McapProblem>,
 }
@@ -51,19 +51,19 @@ struct Index {
 /// A chunk.
 #[derive(Debug, Clone)]
 struct ChunkInfo {
-    /// The record's content in the file.
+    /// Range of the record's content in the file.
     from: usize,
     to: usize,
     first: Time,
     last: Time,
-    /// The channels it has messages of, by number; `None` if unknown.
+    /// The channels of its messages, by number; `None` if unknown.
     channels: Option<Vec<u16>>,
-    /// Found by a scan: it is read up to the first malformed record.
+    /// Whether it was found by a scan: it is then read up to the first malformed record.
     scanned: bool,
 }
 
 impl McapFile {
-    /// Opens a file by its summary; without one, by reading all of it.
+    /// Opens a file by its summary; without one, reads all of it.
     ///
     /// # Errors
     /// [`Error::File`]; [`Error::Storage`] for a file of another kind.
@@ -73,7 +73,7 @@ impl McapFile {
         let bytes = match file.metadata().map_err(failed)?.len() {
             0 => Bytes::Empty,
             // SAFETY: the mapping is read-only and private. What remains is memmap2's caveat, stated at
-            // `Ros2Bag::open`: nobody may shorten the file meanwhile.
+            // `Ros2Bag::open`: the file must not be shortened meanwhile.
             _ => Bytes::Mapped(unsafe { Mmap::map(&file) }.map_err(failed)?),
         };
         let mut opened = Self {

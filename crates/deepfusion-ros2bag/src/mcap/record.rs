@@ -6,9 +6,9 @@ use deepfusion_hint::count_of;
 
 /// The file's first and last bytes.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// What a record is, and its length.
+/// Length of a record's header: its kind and length.
 const HEAD: usize = 9;
-/// The footer and the magic behind it.
+/// Length of the footer and the magic after it.
 pub(super) const TAIL: usize = HEAD + 20 + MAGIC.len();
 
 pub(super) mod op {
@@ -27,54 +27,54 @@ pub(super) mod op {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Record<'a> {
     pub op: u8,
-    /// Where its content begins.
+    /// Position of its content.
     pub start: usize,
     pub content: &'a [u8],
 }
 
 impl Record<'_> {
-    /// Where the next one begins.
+    /// Position of the next record.
     pub(super) fn end(&self) -> usize {
         self.start + self.content.len()
     }
 }
 
-/// A record that is not whole.
+/// An incomplete record.
 #[derive(Debug, PartialEq)]
 pub(super) struct TruncatedRecord<'a> {
     pub op: Option<u8>,
-    /// Where it begins.
+    /// Position of the record.
     pub at: usize,
-    /// Start of its content, and the part of it that is there.
+    /// Start of its content, and the part of it that exists.
     pub start: usize,
     pub content: &'a [u8],
     pub missing: u64,
 }
 
-/// What is wrong with a record of an MCAP file. Its place is counted in the file, or in the chunk that holds it.
+/// What is wrong with a record of an MCAP file. Positions are in the file, or in the chunk that contains the record.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordProblem {
-    /// Its end is missing.
+    /// The end of the record is missing.
     #[error("the record at byte {at} (type {op:#04x}) lacks {}", count_of(*missing, "byte"))]
     Cut {
-        /// Where it begins.
+        /// Position of the record.
         at: usize,
-        /// Its kind.
+        /// Kind of the record.
         op: u8,
-        /// How many bytes are missing.
+        /// Number of missing bytes.
         missing: u64,
     },
-    /// It ends within its kind and length.
-    #[error("the record at byte {at} is cut off within its head")]
+    /// The record ends within its kind and length.
+    #[error("the record at byte {at} is cut off within its header")]
     HeadCut {
-        /// Where it begins.
+        /// Position of the record.
         at: usize,
     },
-    /// A message is shorter than its own head.
+    /// A message is shorter than its header.
     #[error("the message at byte {at} is too short")]
     ShortMessage {
-        /// Where it begins.
+        /// Position of the record.
         at: usize,
     },
 }
@@ -124,7 +124,7 @@ pub(super) fn record(bytes: &[u8], at: usize) -> Result<Option<Record<'_>>, Trun
     }
 }
 
-/// A record's content that has not been read yet. `None` where it ends too early.
+/// The part of a record's content that has not been read yet. Its functions return `None` if it ends too early.
 pub(super) struct Fields<'a>(pub &'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -170,13 +170,13 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// A message's channel and time (of recording), in front of its bytes.
+/// A message's channel and time of recording, which precede its bytes.
 pub(super) struct MessageHead {
     pub channel: u16,
     pub log_time: u64,
 }
 
-/// Bytes in front of a message's own.
+/// Number of bytes before a message's own.
 pub(super) const MESSAGE_HEAD: usize = 2 + 4 + 8 + 8;
 
 impl MessageHead {
@@ -194,9 +194,9 @@ pub(super) struct ChunkHead {
     pub size: u64,
     pub crc: u32,
     pub compression: String,
-    /// Bytes as they are stored.
+    /// Number of bytes as stored.
     pub stored: u64,
-    /// Bytes of this head.
+    /// Length of this header, bytes.
     pub length: usize,
 }
 

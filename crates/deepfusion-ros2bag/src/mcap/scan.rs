@@ -1,4 +1,4 @@
-//! A file without a usable summary, read from the front to its end or its break.
+//! A file without a usable summary, read from the front to its end or the first damage.
 
 use super::chunk::{self, Entry, walk};
 use super::damage::McapProblem;
@@ -7,8 +7,7 @@ use super::record::{MAGIC, MESSAGE_HEAD, MessageHead, RecordProblem, op, record}
 use super::{ChunkInfo, Index};
 use deepfusion_rosbag::Time;
 
-/// The index by going through the file; `summary` is what is wrong with its summary, `None` if nothing is, but that it does not say
-/// everything.
+/// Builds the index by scanning the file. `summary` is what is wrong with its summary, `None` if the summary is only incomplete.
 pub(super) fn read(bytes: &[u8], summary: Option<McapProblem>) -> Index {
     let mut scan = Scan {
         bytes,
@@ -48,7 +47,7 @@ impl Scan<'_> {
                         op::SCHEMA | op::CHANNEL => self.define(found.op, content, at),
                         op::MESSAGE => self.message(content, found.start, at),
                         op::CHUNK => self.chunk(found.start, found.end(), at),
-                        // What follows is the summary, which repeats.
+                        // What follows is the summary, which repeats earlier records.
                         op::DATA_END | op::FOOTER => return,
                         _ => {}
                     }
@@ -119,7 +118,7 @@ impl Scan<'_> {
                 }
             }
         }
-        // Else an empty one, or one whose messages nothing describes.
+        // Otherwise the channel is empty, or its messages have no definition.
         let Some((first, last)) = range else { return };
         self.chunks.push(ChunkInfo {
             from,

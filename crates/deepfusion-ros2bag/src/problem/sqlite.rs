@@ -1,4 +1,4 @@
-//! What SQLite says of a database.
+//! Messages for SQLite's errors about a database.
 
 use crate::storage::COPY_AGAIN;
 use rusqlite::ErrorCode;
@@ -9,7 +9,7 @@ pub(super) fn said(e: &rusqlite::Error) -> String {
         Some(ErrorCode::NotADatabase) => "not an SQLite database".to_owned(),
         Some(ErrorCode::DatabaseCorrupt) => format!("the database is damaged: {e}"),
         Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen) => format!("cannot be opened: {e}"),
-        None | Some(ErrorCode::Unknown) => format!("no recorder's database: {e}"),
+        None | Some(ErrorCode::Unknown) => format!("not a recorder's database: {e}"),
         _ => e.to_string(),
     }
 }
@@ -24,7 +24,7 @@ pub(super) fn hint(e: &rusqlite::Error) -> &'static str {
              once with sqlite3"
         }
         None | Some(ErrorCode::Unknown) => {
-            "a bag has the tables `topics` and `messages`, as rosbag2 writes them"
+            "give a database written by rosbag2, with the tables `topics` and `messages`"
         }
         _ => COPY_AGAIN,
     }

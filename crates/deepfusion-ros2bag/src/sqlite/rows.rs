@@ -1,4 +1,4 @@
-//! Messages from rows: first their positions, some thousand at a time, then each one's bytes.
+//! Messages from rows: first their keys, some thousand at a time, then each one's bytes.
 
 use super::{SqliteFile, failed};
 use crate::packed::{is_packed, unpack};
@@ -15,10 +15,10 @@ const PAGE: i64 = 4096;
 /// The key of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Key {
-    /// Nanoseconds.
+    /// Time in nanoseconds.
     pub time: u64,
     pub id: i64,
-    /// The topic's number; of a list the place among the channels.
+    /// The topic's number; in a list, the index of its channel.
     pub topic: i64,
 }
 
@@ -31,7 +31,7 @@ fn key(row: &rusqlite::Row<'_>) -> rusqlite::Result<Key> {
     })
 }
 
-/// Whether the database can give messages in time order without going through all of them.
+/// Whether the database can order messages by time without reading all of them.
 pub(super) fn is_indexed(database: &Connection) -> bool {
     let text = "SELECT count(*) FROM pragma_index_list('messages') AS list, pragma_index_info(list.name) AS info \
                 WHERE info.seqno = 0 AND info.name = 'timestamp' AND list.partial = 0";
@@ -39,10 +39,10 @@ pub(super) fn is_indexed(database: &Connection) -> bool {
     count.is_ok_and(|count| count > 0)
 }
 
-/// A topic's number, how many messages it has, its first and last time.
+/// A topic's number, its number of messages, its first and last time.
 pub(super) type Count = (i64, u64, (Time, Time));
 
-/// What each topic has.
+/// The number of messages and the time range of each topic.
 pub(super) fn counts(database: &Connection) -> rusqlite::Result<Vec<Count>> {
     let mut rows = database.prepare(
         "SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY topic_id",
@@ -56,7 +56,7 @@ pub(super) fn counts(database: &Connection) -> rusqlite::Result<Vec<Count>> {
     rows.collect()
 }
 
-/// Every message up to the break, in the order they were written.
+/// All messages up to the damage, in the order in which they were written.
 pub(super) fn all(database: &Connection) -> (Vec<Key>, Option<rusqlite::Error>) {
     let mut keys = Vec::new();
     let mut read = || -> rusqlite::Result<()> {
@@ -78,7 +78,7 @@ pub(super) struct Rows<'a> {
     wanted: Vec<bool>,
     selection: Selection,
     page: VecDeque<Key>,
-    /// The last key that was asked for; of a list, how far it was read.
+    /// The last key that was requested; for a list, how far it was read.
     after: (i64, i64),
     listed: usize,
     done: bool,
@@ -122,7 +122,7 @@ impl<'a> Rows<'a> {
             };
             let time = Time::from_nanos(key.time);
             if !self.selection.contains(time) {
-                // In time order: behind the end nothing is wanted.
+                // In time order: after the end of the selection nothing is wanted.
                 return None;
             }
             let wanted = usize::try_from(key.topic)
@@ -140,7 +140,7 @@ impl<'a> Rows<'a> {
             "SELECT id, timestamp, topic_id FROM messages \
              WHERE timestamp >= ?1 AND (timestamp > ?1 OR id > ?2) ORDER BY timestamp, id LIMIT ?3",
         )?;
-        // A selection of little asks for little.
+        // A small selection requests few rows.
         let page = match self.after.1 {
             i64::MIN => 16,
             _ => PAGE,

@@ -1,4 +1,4 @@
-//! The bags that reading is measured on, and reading them: for the bench and for the example that the peer runs.
+//! The bags on which reading is measured, and reading them: for the bench, and for the example that `rosbags_read.py` runs.
 
 #![allow(
     clippy::unwrap_used,
@@ -14,14 +14,14 @@ use std::borrow::Cow;
 use std::hint::black_box;
 use std::path::Path;
 
-/// Name, compression, whether small messages or pictures and clouds, how many.
+/// Name, compression, whether it holds small messages or pictures and clouds, how many.
 pub(crate) const RECORDINGS: [(&str, Compression, bool, u32); 3] = [
     ("small_none.bag", Compression::None, true, 200_000),
     ("large_lz4.bag", Compression::Lz4, false, 240),
     ("large_bz2.bag", Compression::Bz2, false, 24),
 ];
 
-/// Numbers that look random and are the same everywhere.
+/// Numbers that look random and are the same on every machine.
 struct Noise(u64);
 
 impl Noise {
@@ -130,7 +130,7 @@ pub(crate) fn write(
     bag.finish()
 }
 
-/// Opens a bag and makes every message a value of its type; how many, and their bytes.
+/// Opens a bag and decodes every message as its type. Returns the number of messages and their bytes.
 pub(crate) fn read(path: &Path) -> Result<(u64, u64)> {
     let bag = Bag::open(path)?;
     let (mut count, mut bytes) = (0, 0);

@@ -3,18 +3,18 @@ use super::std_msgs::Header;
 use super::wire::message;
 
 message! {
-    /// How a vehicle with steered front wheels drives.
+    /// Speed and steering of a vehicle with steered front wheels.
     #[derive(Copy, Default)]
     AckermannDrive;
-    /// Angle of the virtual front wheel, rad, left is positive.
+    /// Angle of the virtual front wheel, rad, positive to the left.
     steering_angle: f32,
-    /// Its rate, rad/s; 0 is "as fast as possible" in commands.
+    /// Rate of the steering angle, rad/s; 0 is "as fast as possible" in commands.
     steering_angle_velocity: f32,
     /// Forward speed, m/s.
     speed: f32,
-    /// m/s².
+    /// Acceleration, m/s².
     acceleration: f32,
-    /// m/s³.
+    /// Jerk, m/s³.
     jerk: f32,
 }
 
@@ -34,7 +34,7 @@ message! {
             "float32 jerk"
         )
     );
-    /// When and in which frame.
+    /// Time and frame.
     header: Header,
     /// Speed and steering.
     drive: AckermannDrive,

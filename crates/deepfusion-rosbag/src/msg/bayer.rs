@@ -1,7 +1,7 @@
 //! Bilinear demosaicing of Bayer images.
 //!
-//! A missing colour is the mean of the two or four nearest pixels that have it, rounded half up: OpenCV's
-//! `COLOR_Bayer…2RGB`, which cv_bridge takes, to the last digit. At the image's edge the neighbours outside are those inside,
+//! A missing colour is the mean of the two or four nearest pixels that have it, rounded half up. This equals OpenCV's
+//! `COLOR_Bayer…2RGB`, used by cv_bridge, to the last digit. At the image's edge the neighbours outside are those inside,
 //! mirrored at the edge's own pixels, which keeps every colour in its place; OpenCV copies the pixels one further in.
 
 use super::BayerPattern;
@@ -32,7 +32,7 @@ fn mean<const N: usize>(values: [u8; N]) -> u8 {
     ((sum + N / 2) / N) as u8
 }
 
-/// RGB of equally long rows; nothing where there are fewer than two rows or columns, between which nothing can be interpolated.
+/// RGB from rows of equal length; nothing for fewer than two rows or columns, which cannot be interpolated.
 pub(super) fn to_rgb8(rows: &[&[u8]], pattern: BayerPattern) -> Option<Vec<u8>> {
     let (red_row, red_column) = red(pattern);
     let (height, width) = (rows.len(), rows.first()?.len());
@@ -72,7 +72,7 @@ mod tests {
         BayerPattern::Grbg,
     ];
 
-    /// One colour seen through the filters is that colour everywhere, at the edges and in the corners too.
+    /// A scene of one colour, seen through the filters, is that colour everywhere, also at edges and corners.
     #[test]
     fn a_plain_colour_stays_plain_up_to_the_edge() {
         let colour = [200, 90, 7];

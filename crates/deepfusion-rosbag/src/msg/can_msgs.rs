@@ -17,7 +17,7 @@ message! {
     );
     /// Time of reception.
     header: Header,
-    /// The arbitration identifier: 11 bits, or 29 where `is_extended`.
+    /// The arbitration identifier: 11 bits, or 29 if `is_extended`.
     id: u32,
     /// A remote transmission request, without data.
     is_rtr: bool,

@@ -53,8 +53,8 @@ impl Datatype {
         }
     }
 
-    /// The number in the first bytes of `bytes`: exact, as every one of these types fits into an f64. Bytes that are
-    /// not there count as 0; [`PointCloud2::column`] has made sure of them.
+    /// The number in the first bytes of `bytes`; exact, as each of these types fits into an f64. Missing bytes count
+    /// as 0; [`PointCloud2::column`] has checked that there are none.
     #[inline]
     fn read(self, bytes: &[u8], big: bool) -> f64 {
         #[inline]
@@ -156,7 +156,7 @@ impl PointCloud2<'_> {
                 row_step: self.row_step,
             }));
         }
-        // The last row needs no padding behind it. Below 2⁶⁴: 2³² rows of 2³² bytes, less the first.
+        // The last row needs no padding after it. Below 2⁶⁴: 2³² rows of 2³² bytes, less the first.
         let needed = u128::from(height - 1) * u128::from(self.row_step) + u128::from(row);
         if self.point_step == 0 || needed > self.data.len() as u128 {
             return Err(wrong(LayoutProblem::Points {
@@ -167,7 +167,7 @@ impl PointCloud2<'_> {
                 left: self.data.len(),
             }));
         }
-        // Every point takes a byte at least, so that their number is below the data's length.
+        // Every point takes at least one byte, so there are fewer points than bytes of data.
         Ok((width * height) as usize)
     }
 
@@ -175,7 +175,7 @@ impl PointCloud2<'_> {
     ///
     /// # Errors
     /// [`MessageError::NoField`] naming the available fields, [`MessageError::Datatype`], [`MessageError::Layout`] if
-    /// the field lies outside of its point or the points outside of the data.
+    /// the field lies outside its point or the points outside the data.
     pub fn column(&self, name: &str) -> Result<Column<'_>, MessageError> {
         self.column_at(name, 0)
     }
@@ -230,7 +230,7 @@ impl PointCloud2<'_> {
 }
 
 impl PointCloud2<'static> {
-    /// An unordered cloud of f32 fields, packed and little-endian: what LiDAR drivers publish. `columns` are names and
+    /// An unordered cloud of f32 fields, packed and little-endian, as LiDAR drivers publish it. `columns` are names and
     /// values, one per point.
     ///
     /// # Errors
@@ -332,7 +332,7 @@ mod tests {
 
     #[test]
     fn rows_may_be_padded_and_a_cloud_empty() {
-        // Two rows of one point, 4 bytes of padding behind the first.
+        // Two rows of one point, with 4 bytes of padding after the first.
         let mut cloud = cloud();
         (cloud.height, cloud.width, cloud.row_step) = (2, 1, 16);
         assert_eq!(

@@ -1,5 +1,5 @@
-//! Definitions' texts: a type's fields, then, behind a line of 80 `=`, those of every type it uses. Without comments:
-//! the MD5 does not see them.
+//! Texts of definitions: a type's fields, then those of every type it uses, each after a line of 80 `=`. Without comments,
+//! which the MD5 does not cover.
 
 /// The part of a definition that another type needs.
 macro_rules! part {

@@ -2,68 +2,68 @@ use deepfusion_hint::{Hint, count_of};
 use std::borrow::Cow;
 use std::fmt;
 
-/// What can be wrong within a message.
+/// Why a message cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MessageError {
     /// The message ends within a field.
     #[error("field {field}: {} needed, {left} left", count_of(*needed, "byte"))]
     Short {
-        /// The field, with those it lies in: `fields.name`.
+        /// The field, with the fields that contain it: `fields.name`.
         field: String,
-        /// How many bytes it takes.
+        /// Number of bytes it takes.
         needed: u64,
-        /// How many there are.
+        /// Number of bytes left.
         left: usize,
     },
     /// Bytes are left after the last field.
     #[error("{} left after the last field", count_of(*left, "byte"))]
     Long {
-        /// How many.
+        /// Number of bytes left.
         left: usize,
     },
-    /// A string is no UTF-8.
+    /// A string is not UTF-8.
     #[error("field {field}: not UTF-8")]
     Text {
-        /// The field.
+        /// Name of the field.
         field: String,
     },
-    /// A message of ROS 2 is laid out in another way than plain CDR.
+    /// A ROS 2 message has another layout than plain CDR.
     #[error("encapsulation {found:#06x}: expected plain CDR, 0x0000 or 0x0001")]
     Encapsulation {
         /// The representation's number.
         found: u16,
     },
-    /// A cloud has no field of the name.
-    #[error("no field {field} in the cloud; there are {}", fields.join(", "))]
+    /// A cloud has no field of this name.
+    #[error("no field {field} in the cloud; its fields: {}", fields.join(", "))]
     NoField {
-        /// The name asked for.
+        /// The requested name.
         field: String,
-        /// The names there are.
+        /// The names of the cloud's fields.
         fields: Vec<String>,
     },
-    /// A cloud's field has an unknown type of number.
+    /// The number type of a cloud's field is unknown.
     #[error("field {field}: datatype {datatype}, expected 1 (INT8) to 8 (FLOAT64)")]
     Datatype {
-        /// The field's name.
+        /// Name of the field.
         field: String,
-        /// What stands for its type.
+        /// The code of its type.
         datatype: u8,
     },
     /// Sizes within a message contradict each other.
     #[error("{of}: {problem}")]
     Layout {
-        /// What has the sizes.
+        /// The part that has these sizes.
         of: MessagePart,
         /// The contradiction.
         problem: LayoutProblem,
     },
-    /// An image's encoding is unknown, or another than asked for.
+    /// An image's encoding is unknown, or not one of those requested.
     #[error("encoding `{encoding}`: expected {expected}")]
     Encoding {
-        /// The image's.
+        /// The image's encoding.
         encoding: String,
-        /// Those that would do.
+        /// The accepted encodings.
         expected: Cow<'static, str>,
     },
 }
@@ -74,11 +74,11 @@ pub enum MessageError {
 pub enum MessagePart {
     /// An image.
     Image {
-        /// Its width in pixels.
+        /// Width in pixels.
         width: u32,
-        /// Its height in pixels.
+        /// Height in pixels.
         height: u32,
-        /// Its encoding's name.
+        /// Name of the encoding.
         encoding: String,
     },
     /// A cloud of points.
@@ -108,89 +108,89 @@ pub enum LayoutProblem {
     /// A row of pixels is longer than the distance between rows.
     #[error("a row of {row} bytes does not fit into a step of {step}")]
     Row {
-        /// The row's length.
+        /// Length of the row, bytes.
         row: usize,
-        /// From row to row.
+        /// Distance between rows, bytes.
         step: usize,
     },
     /// There are fewer bytes than the pixels take.
     #[error("{} needed, there are {left}", count_of(*needed, "byte"))]
     Pixels {
-        /// How many bytes they take.
+        /// Number of bytes that the pixels take.
         needed: usize,
-        /// How many there are.
+        /// Number of bytes that there are.
         left: usize,
     },
     /// A Bayer pattern does not fit into the image.
-    #[error("a Bayer pattern has two rows and columns or more")]
+    #[error("a Bayer pattern needs at least two rows and two columns")]
     Bayer,
-    /// Pairs of pixels share a colour, and the width is odd.
+    /// Pairs of pixels share a colour, but the width is odd.
     #[error("two pixels share a colour, so the width must be even")]
     OddWidth,
     /// A row of points is longer than the distance between rows.
     #[error("{points} points of {point_step} bytes do not fit into a row of {row_step}")]
     PointRow {
-        /// How many points a row has.
+        /// Number of points in a row.
         points: u64,
-        /// From point to point.
+        /// Distance between points, bytes.
         point_step: u32,
-        /// From row to row.
+        /// Distance between rows, bytes.
         row_step: u32,
     },
     /// There are fewer bytes than the points take.
     #[error("{width}x{height} points of {point_step} bytes need {needed} bytes, there are {left}")]
     Points {
-        /// How many points a row has.
+        /// Number of points in a row.
         width: u64,
-        /// How many rows there are.
+        /// Number of rows.
         height: u64,
-        /// From point to point.
+        /// Distance between points, bytes.
         point_step: u32,
-        /// How many bytes they take.
+        /// Number of bytes that the points take.
         needed: u128,
-        /// How many there are.
+        /// Number of bytes that there are.
         left: usize,
     },
-    /// A field has fewer numbers than were asked for.
+    /// A field has fewer numbers than were requested.
     #[error("{}, number {element} was asked for", count_of(*count, "number"))]
     Element {
-        /// How many it has.
+        /// Number of numbers in the field.
         count: u32,
-        /// The one asked for, counted from 0.
+        /// The requested one, counted from 0.
         element: u32,
     },
-    /// A field lies outside of its point.
-    #[error("bytes {offset} to {end} of a point of {point_step} bytes")]
+    /// A field lies outside its point.
+    #[error("it lies at bytes {offset} to {end} of a point of {point_step} bytes")]
     Outside {
-        /// Where it begins.
+        /// First byte of the field within the point.
         offset: u64,
-        /// Where it ends.
+        /// First byte after the field.
         end: u64,
-        /// From point to point.
+        /// Distance between points, bytes.
         point_step: u32,
     },
     /// Columns have different lengths.
     #[error("{}, {first} has {points}", count_of(*numbers, "number"))]
     Columns {
-        /// How many numbers the column has.
+        /// Number of numbers in the column.
         numbers: usize,
-        /// The first column's name.
+        /// Name of the first column.
         first: String,
-        /// How many numbers that has.
+        /// Number of numbers in the first column.
         points: usize,
     },
     /// The points take more bytes than the format can count.
     #[error("{points} points of {point_step} bytes exceed 4 GiB")]
     TooMany {
-        /// How many points there are.
+        /// Number of points.
         points: usize,
-        /// From point to point.
+        /// Distance between points, bytes.
         point_step: usize,
     },
 }
 
 impl MessageError {
-    /// The same error, of a field within `outer`.
+    /// The same error, about a field within `outer`.
     #[must_use]
     pub(crate) fn within(mut self, outer: &str) -> Self {
         if let Self::Short { field, .. } | Self::Text { field } = &mut self {
@@ -213,13 +213,13 @@ impl Hint for MessageError {
             Self::Encapsulation { .. } => {
                 "the message is damaged, or its middleware wrote XCDR version 2 or parameter lists, which are not read"
             }
-            Self::NoField { .. } => "name one of the fields there are",
+            Self::NoField { .. } => "name one of the listed fields",
             Self::Datatype { .. } | Self::Layout { .. } => {
-                "the driver that made the message describes it wrongly"
+                "correct the driver, which describes the message's layout wrongly"
             }
             Self::Encoding { expected, .. } => {
                 return Some(format!(
-                    "convert the topic, with image_proc or cv_bridge, to one of {expected}"
+                    "convert the topic to one of these, with image_proc or cv_bridge: {expected}"
                 ));
             }
         };

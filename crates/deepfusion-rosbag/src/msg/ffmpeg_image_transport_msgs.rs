@@ -4,7 +4,7 @@ use super::wire::message;
 use std::borrow::Cow;
 
 message! {
-    /// A packet of an encoder in libav's library, as the image transport `ffmpeg` sends it.
+    /// A packet of an encoder of libav, as the image transport `ffmpeg` sends it.
     FfmpegPacket<'a> = "ffmpeg_image_transport_msgs/FFMPEGPacket" "4c1b25efca82fe4dd7addd520d7cc4b9" definition!(
         "std_msgs/Header header"
         "int32 width"
@@ -16,26 +16,26 @@ message! {
         "uint8[] data";
         header!()
     );
-    /// When its image was taken, and the camera's optical frame.
+    /// Time of the image, and the camera's optical frame.
     header: Header,
     /// Columns of the image.
     width: i32,
     /// Rows of the image.
     height: i32,
-    /// The codec (`h264`, `hevc`; of older versions the encoder, `libx264`), and behind semicolons formats of pixels.
+    /// The codec (`h264`, `hevc`; in older versions the encoder, `libx264`), followed by pixel formats, separated by semicolons.
     encoding: String,
     /// The encoder's time stamp.
     pts: u64,
-    /// The encoder's marks: 1 is a key frame.
+    /// The encoder's flags: 1 is a key frame.
     flags: u8,
-    /// Whether the encoding machine's numbers begin with the highest byte.
+    /// Whether the encoding machine is big-endian.
     is_bigendian: bool,
     /// The packet.
     data: Cow<'a, [u8]>,
 }
 
 message! {
-    /// The same message as the first version of the transport, of ROS 1, laid it out.
+    /// The same message in the layout of the first version of the transport, for ROS 1.
     OldFfmpegPacket<'a> = "ffmpeg_image_transport_msgs/FFMPEGPacket" "dedcac975af2f047308b4b7449e5c259" definition!(
         "std_msgs/Header header"
         "uint8[] data"
@@ -46,7 +46,7 @@ message! {
         "uint8 flags";
         header!()
     );
-    /// When its image was taken, and the camera's optical frame.
+    /// Time of the image, and the camera's optical frame.
     header: Header,
     /// The packet.
     data: Cow<'a, [u8]>,
@@ -58,6 +58,6 @@ message! {
     encoding: String,
     /// The encoder's time stamp.
     pts: u64,
-    /// The encoder's marks: 1 is a key frame.
+    /// The encoder's flags: 1 is a key frame.
     flags: u8,
 }

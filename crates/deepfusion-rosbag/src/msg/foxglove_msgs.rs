@@ -4,14 +4,14 @@ use crate::Time;
 use std::borrow::Cow;
 
 message! {
-    /// A frame of a compressed video, whose decoder needs those before it.
+    /// A frame of a compressed video, whose decoder needs the frames before it.
     CompressedVideo<'a> = "foxglove_msgs/CompressedVideo" "c5ea945275bc0729ed72f42e057a67bd" definition!(
         "time timestamp"
         "string frame_id"
         "uint8[] data"
         "string format";
     );
-    /// When it was taken. It has no header of `std_msgs`.
+    /// Time of the image. The message has no header of `std_msgs`.
     timestamp: Time,
     /// The camera's optical frame.
     frame_id: String,

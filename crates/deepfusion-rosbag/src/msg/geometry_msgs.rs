@@ -27,7 +27,7 @@ message! {
 }
 
 message! {
-    /// A rotation as a unit quaternion, w last. All zeros where the publisher has none.
+    /// A rotation as a unit quaternion, w last. All zeros if the publisher has none.
     #[derive(Copy, Default)]
     Quaternion;
     /// x sin(θ/2).
@@ -41,7 +41,7 @@ message! {
 }
 
 message! {
-    /// Where something is and how it is turned: `frame_from_child`.
+    /// A position and orientation: `frame_from_child`.
     #[derive(Copy, Default)]
     Pose;
     /// The child's origin in the frame, metres.
@@ -51,32 +51,32 @@ message! {
 }
 
 message! {
-    /// A pose and how far it is trusted.
+    /// A pose with its covariance.
     #[derive(Copy)]
     PoseWithCovariance;
     /// The pose.
     pose: Pose,
-    /// 6×6, row-major: x, y, z (m), rotation about x, y, z (rad).
+    /// Covariance, 6×6, row-major: x, y, z (m), rotation about x, y, z (rad).
     covariance: [f64; 36],
 }
 
 message! {
-    /// Velocity.
+    /// Linear and angular velocity.
     #[derive(Copy, Default)]
     Twist;
-    /// m/s.
+    /// Linear velocity, m/s.
     linear: Vector3,
-    /// rad/s.
+    /// Angular velocity, rad/s.
     angular: Vector3,
 }
 
 message! {
-    /// A velocity and how far it is trusted.
+    /// A velocity with its covariance.
     #[derive(Copy)]
     TwistWithCovariance;
     /// The velocity.
     twist: Twist,
-    /// 6×6, row-major: x, y, z (m/s), about x, y, z (rad/s).
+    /// Covariance, 6×6, row-major: x, y, z (m/s), about x, y, z (rad/s).
     covariance: [f64; 36],
 }
 
@@ -88,14 +88,14 @@ message! {
         "geometry_msgs/Twist twist";
         header!(), twist!(), vector3!()
     );
-    /// When and in which frame.
+    /// Time and frame.
     header: Header,
     /// The velocity.
     twist: Twist,
 }
 
 message! {
-    /// A velocity with its time and frame, and how far it is trusted: a fused one, or wheel odometry.
+    /// A velocity with its time, frame and covariance, such as a fused one or wheel odometry.
     TwistWithCovarianceStamped = "geometry_msgs/TwistWithCovarianceStamped" "8927a1a12fb2607ceea095b2dc440a96" definition!(
         "std_msgs/Header header"
         "geometry_msgs/TwistWithCovariance twist";
@@ -104,14 +104,14 @@ message! {
         twist!(),
         vector3!()
     );
-    /// When and in which frame.
+    /// Time and frame.
     header: Header,
     /// The velocity.
     twist: TwistWithCovariance,
 }
 
 message! {
-    /// Where a frame is in another: `parent_from_child`, first rotated, then moved.
+    /// The pose of a frame in another: `parent_from_child`, first rotated, then moved.
     #[derive(Copy, Default)]
     Transform;
     /// The child's origin in the parent, metres.
@@ -124,7 +124,7 @@ message! {
     /// A transform with its time and the names of its frames.
     #[derive(Default)]
     TransformStamped;
-    /// When, and the parent's frame.
+    /// Time, and the parent's frame.
     header: Header,
     /// The child's frame.
     child_frame_id: String,

@@ -3,10 +3,10 @@
 use super::{Image, LayoutProblem, MessageError, MessagePart, bayer, yuv};
 use std::borrow::Cow;
 
-/// What [`Image::to_rgb8`] reads.
+/// The encodings that [`Image::to_rgb8`] reads.
 const PICTURES: &str = "mono8, 8UC1, mono16, rgb8, bgr8, 8UC3, rgba8, bgra8, 8UC4, bayer_rggb8, bayer_bggr8, bayer_gbrg8, bayer_grbg8, \
      yuv422, uyvy, yuv422_yuy2, yuyv";
-/// What is known beside [`PICTURES`].
+/// The other known encodings, besides [`PICTURES`].
 const NUMBERS: &str = "16UC1, 32FC1, bayer_rggb16, bayer_bggr16, bayer_gbrg16, bayer_grbg16";
 
 /// A Bayer pattern: the colours of the first row, then of the second.
@@ -41,9 +41,9 @@ pub enum Encoding {
     U16,
     /// `32FC1`: depth in metres.
     Float32,
-    /// `bayer_rggb8` and the like: one colour per pixel, to be interpolated before use.
+    /// `bayer_rggb8` and other patterns: one colour per pixel, to be interpolated before use.
     Bayer8(BayerPattern),
-    /// `bayer_rggb16` and the like.
+    /// `bayer_rggb16` and other patterns.
     Bayer16(BayerPattern),
     /// `yuv422`, `uyvy`: brightness and, of every two pixels, a colour, in the order U, Y, V, Y.
     Uyvy,
@@ -52,7 +52,7 @@ pub enum Encoding {
 }
 
 impl Encoding {
-    /// From its name in a message.
+    /// The encoding by its name in a message.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         if let Some(bayer) = name.strip_prefix("bayer_") {
@@ -106,7 +106,7 @@ impl Image<'_> {
             .ok_or_else(|| self.wrong_encoding(format!("{PICTURES}, {NUMBERS}")))
     }
 
-    /// Its rows from top to bottom, each `width` pixels without the padding behind them.
+    /// Its rows from top to bottom, each `width` pixels without the padding after them.
     ///
     /// # Errors
     /// [`MessageError::Encoding`], and [`MessageError::Layout`] if a row does not fit into its step, or the rows into
@@ -120,7 +120,7 @@ impl Image<'_> {
         if height > 0 && row > step {
             return Err(self.wrong_layout(LayoutProblem::Row { row, step }));
         }
-        // The last row needs no padding behind it.
+        // The last row needs no padding after it.
         let needed = height
             .saturating_sub(1)
             .saturating_mul(step)
@@ -130,7 +130,7 @@ impl Image<'_> {
             return Err(self.wrong_layout(LayoutProblem::Pixels { needed, left }));
         }
         let data = &self.data[..];
-        // Nothing is shown of an image without columns, however many rows it claims.
+        // An image without columns has no pixels, however many rows it claims.
         let rows = if row == 0 { 0 } else { height };
         Ok((0..rows).map(move |y| data.get(y * step..y * step + row).unwrap_or_default()))
     }
@@ -213,7 +213,7 @@ impl Image<'_> {
         }
     }
 
-    /// `change` of every `N` bytes of every row, one after the other.
+    /// Passes every `N` bytes of every row to `change`, one after the other.
     fn each_pixel<const N: usize, const M: usize>(
         &self,
         change: impl Fn(&[u8; N]) -> [u8; M],
@@ -306,7 +306,7 @@ mod tests {
         }
     }
 
-    /// What the hint says is read, is; what it does not, is not.
+    /// The encodings that the hint lists are read; others are not.
     #[test]
     fn the_list_of_what_is_read_is_true() {
         let names = |list: &'static str| list.split(',').map(str::trim);
@@ -372,7 +372,7 @@ mod tests {
     }
 
     proptest::proptest! {
-        /// Whatever a driver claims, there are all of the pixels or an error.
+        /// Whatever a driver claims, the result has all pixels or is an error.
         #[test]
         fn no_claim_panics(number in 0usize..40, width in 0..12u32, height in 0..12u32, step in 0..40u32, data in proptest::collection::vec(0..=255u8, 0..300), big in 0..2u8) {
             let names: Vec<&str> = PICTURES.split(',').chain(NUMBERS.split(',')).collect();

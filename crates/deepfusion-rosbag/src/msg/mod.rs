@@ -1,7 +1,7 @@
 //! The message types of a vehicle's recording, one file per package.
 //!
 //! Each type is declared once, as the list of its fields: the struct, its decoder and its encoder follow from that list
-//! (`message!` in `wire`). MD5 and definition are those of the ROS packages, which the tests check against another
+//! (`message!` in `wire`). MD5 and definition are those of the ROS packages, which the tests compare with another
 //! implementation. Pixels and points are borrowed from the bag; everything else is owned.
 
 mod ackermann_msgs;
@@ -49,17 +49,17 @@ pub trait RosMessage<'a>: Sized {
     /// Its fields, then those of every type it uses, as recorders write them.
     const DEFINITION: &'static str;
 
-    /// From a message's bytes (little-endian, without padding, strings and arrays behind a u32 length).
+    /// Decodes a message's bytes (little-endian, without padding, strings and arrays after a u32 length).
     ///
     /// # Errors
-    /// [`MessageError`] naming the field that does not fit, or telling how many bytes are left over.
+    /// [`MessageError`] naming the field that does not fit, or giving the number of bytes left over.
     fn decode(bytes: &'a [u8]) -> Result<Self, MessageError>;
 
-    /// From a message's bytes as ROS 2 sends them: CDR of either byte order behind its four bytes of encapsulation.
+    /// Decodes a message's bytes as ROS 2 sends them: CDR of either byte order after four bytes of encapsulation.
     /// ROS 2 has no [`Header::seq`]; it is 0.
     ///
     /// # Errors
-    /// As [`Self::decode`], and [`MessageError::Encapsulation`] for another representation than plain CDR.
+    /// As [`Self::decode`], and [`MessageError::Encapsulation`] for a representation other than plain CDR.
     fn decode_cdr(bytes: &'a [u8]) -> Result<Self, MessageError>;
 
     /// Appends the message's bytes to `out`.

@@ -19,11 +19,11 @@ message! {
         twist!(),
         vector3!()
     );
-    /// When, and the frame of the pose.
+    /// Time, and the frame of the pose.
     header: Header,
     /// The vehicle's frame, in which the velocity is given.
     child_frame_id: String,
-    /// `frame_id_from_child_frame_id`.
+    /// The pose, `frame_id_from_child_frame_id`.
     pose: PoseWithCovariance,
     /// Velocity of the child frame, in the child frame.
     twist: TwistWithCovariance,

@@ -5,7 +5,7 @@ use super::wire::message;
 use std::borrow::Cow;
 
 message! {
-    /// An uncompressed image. Its pixels are read by [`Image::rows`](Image::rows) and its kin.
+    /// An uncompressed image. Its pixels are read by [`Image::rows`](Image::rows) and related functions.
     Image<'a> = "sensor_msgs/Image" "060021388200f6f0f447d0fcd9c64743" definition!(
         "std_msgs/Header header"
         "uint32 height"
@@ -16,7 +16,7 @@ message! {
         "uint8[] data";
         header!()
     );
-    /// When it was taken, and the camera's optical frame (x right, y down, z forward).
+    /// Time of the image, and the camera's optical frame (x right, y down, z forward).
     header: Header,
     /// Rows.
     height: u32,
@@ -24,7 +24,7 @@ message! {
     width: u32,
     /// Encoding of a pixel: `mono8`, `rgb8`, `16UC1`, …
     encoding: String,
-    /// Whether numbers of several bytes begin with the highest (0 or 1).
+    /// Whether numbers of several bytes are big-endian (0 or 1).
     is_bigendian: u8,
     /// Bytes from one row to the next.
     step: u32,
@@ -40,7 +40,7 @@ message! {
         "uint8[] data";
         header!()
     );
-    /// When it was taken, and the camera's optical frame.
+    /// Time of the image, and the camera's optical frame.
     header: Header,
     /// `jpeg`, `png`, or longer: `bgr8; jpeg compressed bgr8`.
     format: String,
@@ -60,7 +60,7 @@ message! {
     height: u32,
     /// Its columns.
     width: u32,
-    /// Whether the rectified image is to be cropped, too.
+    /// Whether the rectified image is cropped as well.
     do_rectify: bool,
 }
 
@@ -88,7 +88,7 @@ message! {
             "bool do_rectify"
         )
     );
-    /// When it held, and the camera's optical frame.
+    /// Time of the calibration, and the camera's optical frame.
     header: Header,
     /// Rows of the calibrated image.
     height: u32,
@@ -98,7 +98,7 @@ message! {
     distortion_model: String,
     /// The field `D`: the distortion's coefficients.
     d: Vec<f64>,
-    /// The field `K`: intrinsics of the raw image, 3×3, row-major, pixels. All 0 where it is not calibrated.
+    /// The field `K`: intrinsics of the raw image, 3×3, row-major, pixels. All 0 if the camera is not calibrated.
     k: [f64; 9],
     /// The field `R`: `rectified_from_cam`, 3×3, row-major.
     r: [f64; 9],
@@ -113,7 +113,7 @@ message! {
 }
 
 impl CameraInfo {
-    /// Of a pinhole camera without distortion: fx, fy, cx, cy in pixels of an image of this width and height.
+    /// The calibration of a pinhole camera without distortion: fx, fy, cx, cy in pixels of an image of this width and height.
     #[must_use]
     pub fn pinhole(
         header: Header,
@@ -137,21 +137,21 @@ impl CameraInfo {
 }
 
 message! {
-    /// A number that every point of a cloud has.
+    /// A field of every point of a cloud.
     #[derive(Eq, Hash)]
     PointField;
-    /// `x`, `y`, `z`, `intensity`, `velocity`, …
+    /// Name: `x`, `y`, `z`, `intensity`, `velocity`, …
     name: String,
-    /// Bytes from the point's start.
+    /// Offset from the point's start, bytes.
     offset: u32,
-    /// 1 to 8: i8, u8, i16, u16, i32, u32, f32, f64.
+    /// Code of the number type, 1 to 8: i8, u8, i16, u16, i32, u32, f32, f64.
     datatype: u8,
     /// Number of elements; 0 means 1.
     count: u32,
 }
 
 message! {
-    /// A point cloud whose layout stands in the message. Its numbers are read by
+    /// A point cloud whose layout is described in the message. Its numbers are read by
     /// [`PointCloud2::column`](PointCloud2::column).
     PointCloud2<'a> = "sensor_msgs/PointCloud2" "1158d486dd51d683ce2f1be655c3c181" definition!(
         "std_msgs/Header header"
@@ -180,7 +180,7 @@ message! {
             "uint32 count"
         )
     );
-    /// When it was measured, and the sensor's frame.
+    /// Time of the measurement, and the sensor's frame.
     header: Header,
     /// Rows; 1 for an unordered cloud.
     height: u32,
@@ -188,7 +188,7 @@ message! {
     width: u32,
     /// The fields of a point.
     fields: Vec<PointField>,
-    /// Whether numbers of several bytes begin with the highest.
+    /// Whether numbers of several bytes are big-endian.
     is_bigendian: bool,
     /// Bytes from one point to the next.
     point_step: u32,
@@ -212,24 +212,24 @@ message! {
         "float64[9] linear_acceleration_covariance";
         header!(), quaternion!(), vector3!()
     );
-    /// When it was measured, and the sensor's frame.
+    /// Time of the measurement, and the sensor's frame.
     header: Header,
-    /// `world_from_imu`, if the sensor provides it.
+    /// Orientation `world_from_imu`, if the sensor provides it.
     orientation: Quaternion,
-    /// 3×3, row-major, rad². A first element of −1: there is no orientation.
+    /// Covariance of the orientation, 3×3, row-major, rad². If its first element is −1, there is no orientation.
     orientation_covariance: [f64; 9],
-    /// rad/s.
+    /// Angular velocity, rad/s.
     angular_velocity: Vector3,
-    /// 3×3, row-major, (rad/s)². A first element of −1: there is no angular velocity.
+    /// Its covariance, 3×3, row-major, (rad/s)². If its first element is −1, there is no angular velocity.
     angular_velocity_covariance: [f64; 9],
-    /// m/s², gravity included: +9.8 upwards at rest.
+    /// Acceleration, m/s², gravity included: +9.8 upwards at rest.
     linear_acceleration: Vector3,
-    /// 3×3, row-major, (m/s²)². A first element of −1: there is no acceleration.
+    /// Its covariance, 3×3, row-major, (m/s²)². If its first element is −1, there is no acceleration.
     linear_acceleration_covariance: [f64; 9],
 }
 
 message! {
-    /// How good a satellite fix is.
+    /// The kind of a satellite fix.
     #[derive(Copy, Eq, Hash, Default)]
     NavSatStatus;
     /// −1 no fix, 0 fix, 1 satellite-based, 2 ground-based augmentation.
@@ -239,7 +239,7 @@ message! {
 }
 
 message! {
-    /// A position by satellite.
+    /// A position from satellites.
     NavSatFix = "sensor_msgs/NavSatFix" "2d3a8cd499b9b4a0249fb98fd05cfa48" definition!(
         "uint8 COVARIANCE_TYPE_UNKNOWN=0"
         "uint8 COVARIANCE_TYPE_APPROXIMATED=1"
@@ -267,18 +267,18 @@ message! {
             "uint16 service"
         )
     );
-    /// When it was measured, and the antenna's frame.
+    /// Time of the measurement, and the antenna's frame.
     header: Header,
     /// Whether there is a fix.
     status: NavSatStatus,
-    /// Degrees, north is positive (WGS 84).
+    /// Latitude in degrees, positive north (WGS 84).
     latitude: f64,
-    /// Degrees, east is positive.
+    /// Longitude in degrees, positive east.
     longitude: f64,
-    /// Metres above the ellipsoid; NaN where it is unknown.
+    /// Height above the ellipsoid in metres; NaN if it is unknown.
     altitude: f64,
-    /// 3×3, row-major, m², about east, north, up.
+    /// Covariance, 3×3, row-major, m², about east, north, up.
     position_covariance: [f64; 9],
-    /// 0 unknown, 1 approximated, 2 only the diagonal, 3 all of it.
+    /// What is known of the covariance: 0 nothing, 1 approximated, 2 only the diagonal, 3 all of it.
     position_covariance_type: u8,
 }

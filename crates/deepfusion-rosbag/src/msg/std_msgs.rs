@@ -15,7 +15,7 @@ pub struct Header {
 }
 
 impl<'a> Wire<'a> for Header {
-    /// Of ROS 2, which has the fewer fields.
+    /// The header as ROS 2 has it, without the counter.
     const LEAST: usize = Time::LEAST + String::LEAST;
 
     fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
@@ -39,7 +39,7 @@ impl<'a> Wire<'a> for Header {
 }
 
 message! {
-    /// A number.
+    /// A 32-bit number.
     #[derive(Copy, Default)]
     Float32 = "std_msgs/Float32" "73fcbf46b49191e672908e50842a83d4" definition!("float32 data";);
     /// The number; its unit is the publisher's.
@@ -47,7 +47,7 @@ message! {
 }
 
 message! {
-    /// A number.
+    /// A 64-bit number.
     #[derive(Copy, Default)]
     Float64 = "std_msgs/Float64" "fdb28210bfa9d7c91146260178d9a584" definition!("float64 data";);
     /// The number; its unit is the publisher's.

@@ -3,7 +3,7 @@ use super::geometry_msgs::TransformStamped;
 use super::wire::message;
 
 message! {
-    /// Frames within frames, as `/tf` and `/tf_static` have them.
+    /// Transforms between frames, as published on `/tf` and `/tf_static`.
     #[derive(Default)]
     TFMessage = "tf2_msgs/TFMessage" "94810edda583a504dfda3829e70d7eec" definition!(
         "geometry_msgs/TransformStamped[] transforms";
@@ -14,7 +14,7 @@ message! {
 }
 
 message! {
-    /// The same under the name that ROS 1 had for it before tf2; old recordings have it on `/tf`.
+    /// The same under the name that ROS 1 used before tf2; old recordings have it on `/tf`.
     #[derive(Default)]
     OldTFMessage = "tf/tfMessage" "94810edda583a504dfda3829e70d7eec" definition!(
         "geometry_msgs/TransformStamped[] transforms";

@@ -1,10 +1,10 @@
-//! Serialisation of messages: every field's type reads and writes itself, and `message!` makes a type from a list of fields.
+//! Serialisation of messages: every field's type reads and writes itself, and `message!` creates a type from a list of fields.
 
 use super::MessageError;
 use crate::Time;
 use std::borrow::Cow;
 
-/// A message's bytes that have not been read yet.
+/// The bytes of a message that have not been read yet.
 pub(crate) struct Reader<'a> {
     rest: &'a [u8],
     format: Format,
@@ -13,9 +13,9 @@ pub(crate) struct Reader<'a> {
 /// How the bytes are laid out.
 #[derive(Clone, Copy)]
 enum Format {
-    /// Little-endian, without padding, strings without an end mark.
+    /// ROS 1: little-endian, without padding, strings without an end mark.
     Ros1,
-    /// Numbers lie at multiples of their size, counted from the payload's start; strings end in a zero.
+    /// CDR: numbers lie at multiples of their size, counted from the payload's start; strings end in a zero.
     Cdr { big: bool, length: usize },
 }
 
@@ -56,7 +56,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Whether the message is one of ROS 2.
+    /// Whether the message comes from ROS 2.
     pub(crate) fn is_cdr(&self) -> bool {
         matches!(self.format, Format::Cdr { .. })
     }
@@ -70,8 +70,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The length in front of a string or an array whose items take at least `item` bytes each: never more of them
-    /// than there are bytes for.
+    /// The length before a string or an array whose items take at least `item` bytes each; an error if there are too few
+    /// bytes for them.
     fn length(&mut self, item: usize) -> Result<usize, MessageError> {
         let length = u32::read(self)? as usize;
         if length.saturating_mul(item) > self.rest.len() {
@@ -82,7 +82,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Decodes a whole message of ROS 1, up to its last byte.
+/// Decodes a whole ROS 1 message, up to its last byte.
 pub(crate) fn decode<'a, T: Wire<'a>>(bytes: &'a [u8]) -> Result<T, MessageError> {
     let mut reader = Reader {
         rest: bytes,
@@ -95,7 +95,7 @@ pub(crate) fn decode<'a, T: Wire<'a>>(bytes: &'a [u8]) -> Result<T, MessageError
     }
 }
 
-/// Decodes a whole message of ROS 2: four bytes that say how it is laid out, then plain CDR (OMG DDSI-RTPS 10.5, XCDR
+/// Decodes a whole ROS 2 message: four bytes that describe its layout, then plain CDR (OMG DDSI-RTPS 10.5, XCDR
 /// version 1).
 pub(crate) fn decode_cdr<'a, T: Wire<'a>>(bytes: &'a [u8]) -> Result<T, MessageError> {
     let big = cdr_is_big_endian(bytes)?;
@@ -108,14 +108,14 @@ pub(crate) fn decode_cdr<'a, T: Wire<'a>>(bytes: &'a [u8]) -> Result<T, MessageE
         },
     };
     let message = T::read(&mut reader)?;
-    // Middleware rounds a message up to a multiple of four bytes.
+    // Middleware pads a message to a multiple of four bytes.
     match reader.rest.len() {
         0..4 => Ok(message),
         left => Err(MessageError::Long { left }),
     }
 }
 
-/// Decodes what a message begins with.
+/// Decodes the beginning of a message.
 pub(crate) fn decode_first<'a, T: Wire<'a>>(bytes: &'a [u8], cdr: bool) -> Result<T, MessageError> {
     let format = if cdr {
         Format::Cdr {
@@ -129,10 +129,10 @@ pub(crate) fn decode_first<'a, T: Wire<'a>>(bytes: &'a [u8], cdr: bool) -> Resul
     T::read(&mut Reader { rest, format })
 }
 
-/// Bytes in front of a CDR payload: what it is, and options.
+/// Number of bytes before a CDR payload: its representation, and options.
 pub(crate) const CDR_HEADER: usize = 4;
 
-/// Whether the numbers of a CDR message begin with their highest byte.
+/// Whether the numbers of a CDR message are big-endian.
 pub(crate) fn cdr_is_big_endian(bytes: &[u8]) -> Result<bool, MessageError> {
     match bytes {
         [0, 0, _, _, ..] => Ok(true),
@@ -191,7 +191,7 @@ impl<'a> Wire<'a> for Time {
 
     fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
         let (sec, nsec) = (u32::read(reader)?, u32::read(reader)?);
-        // ROS 2 counts seconds with a sign; what lies before 1970 is no time of a recording.
+        // ROS 2 counts seconds with a sign; times before 1970 do not occur in recordings.
         let before_1970 = reader.is_cdr() && sec > i32::MAX as u32;
         Ok(if before_1970 {
             Self::ZERO
@@ -273,8 +273,8 @@ impl<'a, T: Wire<'a>> Wire<'a> for Vec<T> {
     }
 }
 
-/// A struct of fields in the order of the wire, and how it is read and written; with `= "type" "md5" definition` after
-/// its name a message that a topic can have.
+/// A struct of fields in the order of the wire, with its reader and writer. With `= "type" "md5" definition` after
+/// its name, it is a message that can have a topic.
 macro_rules! message {
     (
         $(#[$about:meta])*

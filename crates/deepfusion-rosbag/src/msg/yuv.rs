@@ -1,12 +1,12 @@
 //! Conversion of YUV to RGB.
 //!
-//! BT.601 in its limited range: brightness 16 to 235, differences 16 to 240 around 128, as OpenCV's `COLOR_YUV2RGB_UYVY` and `_YUYV` take them, which
-//! cv_bridge uses for `yuv422` and `yuv422_yuy2`. A camera that sends the full range comes out with a little too much contrast. OpenCV's
-//! whole numbers, so that the results are the same to the last digit:
+//! BT.601 in its limited range: brightness 16 to 235, differences 16 to 240 around 128, as in OpenCV's `COLOR_YUV2RGB_UYVY` and `_YUYV`,
+//! which cv_bridge uses for `yuv422` and `yuv422_yuy2`. A camera that sends the full range gets a little too much contrast. The integer
+//! arithmetic is OpenCV's, so that the results are the same to the last digit:
 //!
 //! R = 1.164 (Y − 16) + 1.596 V, G = 1.164 (Y − 16) − 0.813 V − 0.391 U, B = 1.164 (Y − 16) + 2.018 U, with U and V less 128
 
-/// The factors are multiplied by 2 to this.
+/// Fractional bits of the factors.
 const SHIFT: u32 = 20;
 const FROM_Y: i32 = 1_220_542;
 const R_FROM_V: i32 = 1_673_527;

@@ -4,64 +4,64 @@ use super::decompress::DecompressProblem;
 use crate::compression::Compression;
 use deepfusion_hint::count_of;
 
-/// Why a chunk cannot be read, or not all of it.
+/// Why a chunk, or a part of it, cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChunkProblem {
-    /// It is the last of a file that was cut off.
+    /// The chunk is the last one of a file that was cut off.
     #[error(
-        "the last chunk should have {}, {left} {} there",
+        "the last chunk should have {}, {left} {} left",
         count_of(*stated, "byte"),
         if *left == 1 { "is" } else { "are" }
     )]
     Cut {
-        /// How many bytes it should have.
+        /// Number of bytes it should have.
         stated: usize,
-        /// How many there are.
+        /// Number of bytes left.
         left: usize,
     },
-    /// It is the last, and the recorder was stopped while writing it.
+    /// The chunk is the last one, and the recorder was stopped while writing it.
     #[error("the recorder did not finish the last chunk")]
     Unfinished,
-    /// Its content is too long for the positions of its messages.
-    #[error("a chunk beyond 4 GiB")]
+    /// The content is too long for the positions of its messages.
+    #[error("the chunk is larger than 4 GiB")]
     TooLong,
-    /// It is compressed in a way that is not read.
-    #[error("compression {name}; none, lz4 and bz2 are read")]
+    /// The compression is unknown.
+    #[error("unknown compression {name}, expected none, lz4 or bz2")]
     Compression {
-        /// The compression's name, escaped.
+        /// Name of the compression, escaped.
         name: String,
     },
-    /// It is stored without compression, and its header says another length.
+    /// The chunk is not compressed, and its length differs from its header's.
     #[error("{}, its header says {stated}", count_of(*bytes, "byte"))]
     StoredLength {
-        /// Its length.
+        /// Its length, bytes.
         bytes: usize,
-        /// The length in its header.
+        /// The length in its header, bytes.
         stated: usize,
     },
-    /// It takes more memory than is allowed.
+    /// The chunk takes more memory than is allowed.
     #[error("{} decompressed, the limit is {limit} (max_chunk_bytes)", count_of(*bytes, "byte"))]
     Limit {
-        /// How many bytes it has decompressed, as its header says.
+        /// Its decompressed size in bytes, as its header says.
         bytes: usize,
-        /// The limit.
+        /// The limit, bytes.
         limit: usize,
     },
-    /// It decompresses to less than its header says.
+    /// The chunk decompresses to fewer bytes than its header says.
     #[error("{} decompressed, its header says {stated}", count_of(*bytes, "byte"))]
     Length {
-        /// How many bytes came out.
+        /// Number of decompressed bytes.
         bytes: usize,
-        /// The length in its header.
+        /// The size in its header, bytes.
         stated: usize,
     },
-    /// It cannot be decompressed.
+    /// The chunk cannot be decompressed.
     #[error("{}: {source}", compression.name())]
     Decompress {
-        /// How it is compressed.
+        /// Compression of the chunk.
         compression: Compression,
-        /// Why not.
+        /// The decoder's error.
         source: DecompressProblem,
     },
 }

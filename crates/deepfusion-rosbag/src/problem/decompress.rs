@@ -7,40 +7,40 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecompressProblem {
-    /// It is longer than it may be.
+    /// The content is longer than allowed.
     #[error("more than the {} expected", count_of(*most, "byte"))]
     TooLong {
-        /// How many bytes it may have.
+        /// Allowed number of bytes.
         most: usize,
     },
-    /// A block is longer than it may be, or damaged so that it seems to be.
-    #[error("broken, or more than the {} expected", count_of(*most, "byte"))]
+    /// A block is longer than allowed, or damaged so that it seems to be.
+    #[error("damaged, or more than the {} expected", count_of(*most, "byte"))]
     BrokenOrTooLong {
-        /// How many bytes the content may have.
+        /// Allowed number of bytes of the content.
         most: usize,
     },
-    /// It ends too early.
+    /// The data ends too early.
     #[error("unexpected end of file")]
     Cut,
-    /// It does not begin as an LZ4 frame.
-    #[error("no LZ4 frame begins here")]
+    /// The data does not begin with an LZ4 frame.
+    #[error("not an LZ4 frame")]
     NoFrame,
-    /// It is an LZ4 frame that is not read.
-    #[error("an LZ4 frame of another version, or with a dictionary")]
+    /// The LZ4 frame needs features that are not supported.
+    #[error("unsupported LZ4 frame: another version, or with a dictionary")]
     Frame,
-    /// The size of an LZ4 frame's blocks is none of those there are.
-    #[error("an unknown block size")]
+    /// The block size of an LZ4 frame is unknown.
+    #[error("unknown block size")]
     BlockSize,
-    /// The content has another size than the LZ4 frame says.
+    /// The content has another size than the LZ4 frame's header says.
     #[error("the content has another size than the frame header says")]
     ContentSize,
-    /// A checksum differs.
+    /// A checksum is wrong.
     #[error("{part} checksum is wrong")]
     Checksum {
-        /// Whose.
+        /// The part whose checksum is wrong.
         part: FramePart,
     },
-    /// What the decoder said, whose own error cannot be kept: it is not to be cloned or compared.
+    /// The decoder's message; its error itself can be neither cloned nor compared.
     #[error("{0}")]
     Decoder(String),
 }
@@ -57,7 +57,7 @@ pub enum FramePart {
     Content,
 }
 
-/// In the genitive.
+/// Written as a genitive.
 impl fmt::Display for FramePart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

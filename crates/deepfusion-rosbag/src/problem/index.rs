@@ -8,74 +8,74 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IndexProblem {
-    /// It should begin where the bag cannot have one.
+    /// The index cannot begin at the given position.
     #[error("the index should be at byte {at}, the file has {bytes}")]
     OutsideFile {
-        /// Where it should begin.
+        /// The position in the bag header.
         at: usize,
-        /// The file's length.
+        /// The file's length, bytes.
         bytes: usize,
     },
-    /// A record of it has another version than is read.
+    /// A record of the index has an unsupported version.
     #[error("{record} of version {version}, expected 1")]
     Version {
-        /// Which record.
+        /// Kind of the record.
         record: IndexRecord,
-        /// Its version.
+        /// Version of the record.
         version: u32,
     },
-    /// It names a chunk where no chunk can be.
+    /// The index names a chunk at an impossible position.
     #[error("a chunk at byte {at}, outside of the bag's chunks")]
     ChunkPlace {
-        /// Where the chunk should begin.
+        /// The position of the chunk.
         at: u64,
     },
-    /// A chunk's list of connections has another length than it should.
+    /// A chunk's list of connections has the wrong length.
     #[error(
-        "{} of 8 bytes, but {}",
+        "expected {} of 8 bytes each, found {}",
         count_of(*count, "connection"),
         count_of(*bytes, "byte")
     )]
     Connections {
-        /// How many connections there should be.
+        /// Number of connections there should be.
         count: usize,
-        /// The list's length.
+        /// Length of the list, bytes.
         bytes: usize,
     },
-    /// It names a connection that the bag does not have.
+    /// The index names a connection that the bag does not have.
     #[error("connection {connection} is not among the bag's connections")]
     NoConnection {
         /// The connection's number.
         connection: u32,
     },
-    /// A chunk has index data of a connection that it should not hold.
+    /// A chunk has index data of a connection that it should not contain.
     #[error("index data of connection {connection}, which the chunk should not hold")]
     StrayData {
         /// The connection's number.
         connection: u32,
     },
-    /// A chunk's index data is of another number of messages than the index says.
+    /// A chunk's index data has another number of messages than the index says.
     #[error(
         "index data of {} in {}, the index says {promised}",
         count_of(*count, "message"),
         count_of(*bytes, "byte")
     )]
     Data {
-        /// How many messages it says to have.
+        /// Number of messages in the index data.
         count: usize,
-        /// Its length.
+        /// Length of the index data, bytes.
         bytes: usize,
-        /// How many messages the index says.
+        /// Number of messages in the index.
         promised: u32,
     },
-    /// A message is another one than the index says.
+    /// A message is not the one that the index says.
     #[error(
         "the index has a message of connection {connection} at {time}, the chunk one of {found} at {found_time}"
     )]
     OtherMessage {
-        /// The connection that the index says.
+        /// The connection in the index.
         connection: u32,
-        /// The time that the index says.
+        /// The time in the index.
         time: Time,
         /// The message's connection.
         found: u32,
@@ -85,9 +85,9 @@ pub enum IndexProblem {
     /// A chunk has a message before its first one.
     #[error("a message at {time}, the index says the first is at {first}")]
     Early {
-        /// The message's time.
+        /// Time of the message.
         time: Time,
-        /// The first message's time by the index.
+        /// Time of the first message according to the index.
         first: Time,
     },
 }
@@ -96,9 +96,9 @@ pub enum IndexProblem {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum IndexRecord {
-    /// What the index at the end of the bag says of a chunk.
+    /// A chunk's record in the index at the end of the bag.
     ChunkInformation,
-    /// Where a chunk's messages of one connection are, behind the chunk.
+    /// The positions of a chunk's messages of one connection, after the chunk.
     IndexData,
 }
 

@@ -8,58 +8,58 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordProblem {
-    /// A part of it goes beyond the end of the file, or of its chunk.
+    /// A part of the record goes beyond the end of the file, or of its chunk.
     #[error("{part} goes beyond the end ({})", count_of(*bytes, "byte"))]
     BeyondEnd {
         /// The part.
         part: RecordPart,
-        /// How many bytes the file or the chunk has.
+        /// Length of the file or the chunk, bytes.
         bytes: usize,
     },
-    /// Its data is cut off.
+    /// The record's data is cut off.
     #[error(
         "a record's data should have {}, {left} {} left",
         count_of(*stated, "byte"),
         if *left == 1 { "is" } else { "are" }
     )]
     DataCut {
-        /// How many bytes it should have.
+        /// Number of bytes it should have.
         stated: usize,
-        /// How many are there.
+        /// Number of bytes left.
         left: usize,
     },
-    /// It is of another kind than what has to stand there.
+    /// The record is of another kind than expected.
     #[error("expected {} (op {expected}), found {}", name_of(*expected), found_op(*found))]
     Kind {
-        /// The field `op` that it should have.
+        /// The expected value of the field `op`.
         expected: u8,
-        /// The one it has.
+        /// The value it has.
         found: Option<u8>,
     },
-    /// It is no message.
+    /// The record is not a message.
     #[error("expected a message (op 2, conn, time)")]
     NoMessage,
-    /// It is of a kind that stands elsewhere.
-    #[error("op {op} cannot stand between chunks")]
+    /// The record is of a kind that is not allowed here.
+    #[error("op {op} is not allowed between chunks")]
     Misplaced {
-        /// Its field `op`.
+        /// The field `op` of the record.
         op: u8,
     },
     /// There is no record.
-    #[error("no record begins here (no field op)")]
+    #[error("not a record (no field op)")]
     NoRecord,
     /// A field is missing.
     #[error("field {field} is missing")]
     NoField {
-        /// The field's name.
+        /// Name of the field.
         field: &'static str,
     },
     /// A field has another length than the format says.
     #[error("field {field} has {}, expected {expected}", count_of(*bytes, "byte"))]
     FieldLength {
-        /// The field's name.
+        /// Name of the field.
         field: &'static str,
-        /// Its length.
+        /// Length of the field, bytes.
         bytes: usize,
         /// The length it should have.
         expected: usize,
@@ -78,7 +78,7 @@ pub enum RecordPart {
     HeaderLength,
     /// Its header.
     Header {
-        /// How many bytes it should have.
+        /// Number of bytes it should have.
         bytes: usize,
     },
     /// The length of its data.

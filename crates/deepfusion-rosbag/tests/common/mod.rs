@@ -1,4 +1,4 @@
-//! What several tests share: messages as the lines that the reference scripts write.
+//! Shared by several tests: messages as the lines that the reference scripts write.
 
 #![allow(
     clippy::unwrap_used,
@@ -183,8 +183,8 @@ pub(crate) fn lines_of(value: &impl Lines) -> Vec<String> {
     lines
 }
 
-/// The message's values as its own type, having checked that they encode to the same bytes; none of a type that is
-/// not known.
+/// The message's values as its own type, after checking that they encode to the same bytes; none for an unknown
+/// type.
 pub(crate) fn lines(message: &Message<'_>) -> Vec<String> {
     match message.connection().type_name.as_str() {
         Float32::TYPE => typed::<Float32>(message),
@@ -203,8 +203,8 @@ pub(crate) fn lines(message: &Message<'_>) -> Vec<String> {
     }
 }
 
-/// A folder of real bags: `rosbag` below `DEEPFUSION_DATA`, or `../shared/data` beside the workspace. Says so and gives
-/// nothing where it is absent.
+/// A folder of real bags: `rosbag` below `DEEPFUSION_DATA`, or `../shared/data` beside the workspace. If it is missing, prints so and
+/// returns `None`.
 pub(crate) fn real_bags() -> Option<PathBuf> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = std::env::var_os("DEEPFUSION_DATA")
@@ -214,7 +214,7 @@ pub(crate) fn real_bags() -> Option<PathBuf> {
         return Some(path);
     }
     eprintln!(
-        "skipped: {} is not there (set DEEPFUSION_DATA)",
+        "skipped: no folder {} (set DEEPFUSION_DATA)",
         path.display()
     );
     None

@@ -63,7 +63,7 @@ def main():
         bytes_of = {"ros1": ROS1.serialize_ros1(value, kind)}
         for name, little in [("cdr", True), ("cdr_big", False)]:
             bytes_of[name] = ROS2.serialize_cdr(as_ros2(value), kind, little_endian=little)
-        # What it reads of its own bytes.
+        # The values that it reads from its own bytes.
         read = ROS1.deserialize_ros1(bytes_of["ros1"], kind)
         read2 = ROS2.deserialize_cdr(bytes_of["cdr_big"], kind)
         types[ros1.ros1(kind)] = {

@@ -1,4 +1,4 @@
-//! What names a live source, and how it is passed to ffmpeg.
+//! The address of a live source, and how it is passed to ffmpeg.
 
 use super::camera_mode::CameraMode;
 use crate::{Error, LiveProblem, Result, SourceKind};
@@ -10,16 +10,16 @@ use std::path::PathBuf;
 pub struct Address {
     text: String,
     kind: SourceKind,
-    /// Width and height that a camera is asked for where its text asks for none.
+    /// Width and height requested from a camera if its text requests none.
     size: Option<(u32, u32)>,
 }
 
-/// What stands before a camera's number or name.
+/// Prefix of a camera's number or name.
 const CAMERA: &str = "camera:";
 
 impl Address {
-    /// `camera:0`, `/dev/video0`, `-`, or anything with a scheme (`rtsp://…`); `None` is for files. Behind a camera's name may stand what it is to
-    /// give, any part of `?size=1920x1080&fps=30&format=mjpeg`; [`Self::check`] says whether that is understood.
+    /// `camera:0`, `/dev/video0`, `-`, or anything with a scheme (`rtsp://…`); `None` is for files. Settings may follow a camera's name, any
+    /// part of `?size=1920x1080&fps=30&format=mjpeg`; [`Self::check`] tests whether they are understood.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let kind = if text == "-" {
@@ -39,14 +39,14 @@ impl Address {
         })
     }
 
-    /// The same, where it is a camera asked for images of this width and height, unless it is asked for others already.
+    /// The same address, with images of this width and height requested from a camera, unless its text requests others already.
     #[must_use]
     pub fn or_of_size(self, size: (u32, u32)) -> Self {
         let size = Some(size);
         Self { size, ..self }
     }
 
-    /// That it is said which camera is meant, and understood what it is to give, before it is opened.
+    /// Checks, before the source is opened, that a camera is named and its settings are understood.
     ///
     /// # Errors
     /// [`Error::NoCameraName`], [`Error::CameraMode`].
@@ -57,7 +57,7 @@ impl Address {
         Ok(())
     }
 
-    /// A camera's number or name, and what it is to give.
+    /// A camera's number or name, and its settings.
     fn camera(&self) -> Result<(&str, CameraMode)> {
         let name = self.text.strip_prefix(CAMERA).unwrap_or(&self.text);
         let (name, asked) = name.split_once('?').unwrap_or((name, ""));
@@ -89,7 +89,7 @@ impl Address {
         self.kind
     }
 
-    /// Whether its end can be meant: a camera has none, be it here or at the end of a wire.
+    /// Whether its end may be intended: that of a camera, local or over the network, is not.
     pub(super) fn may_end(&self) -> bool {
         self.kind != SourceKind::Camera && !self.is_rtsp()
     }
@@ -98,7 +98,7 @@ impl Address {
         scheme(&self.text).is_some_and(|s| s.to_ascii_lowercase().starts_with("rtsp"))
     }
 
-    /// The same text with the address' password, where that is in it, made unreadable.
+    /// The same text with the address's password, if it contains that, replaced.
     pub(super) fn without_password(&self, text: &str) -> String {
         match self.credentials() {
             Some(secret) => text.replace(secret, "***"),
@@ -114,17 +114,17 @@ impl Address {
         (!secret.is_empty()).then_some(secret)
     }
 
-    /// ffmpeg's arguments up to and with `-i`, on this system (as [`std::env::consts::OS`] names it).
+    /// ffmpeg's arguments up to and including `-i`, on this system (as [`std::env::consts::OS`] names it).
     ///
     /// # Errors
-    /// [`Error::Program`] where a camera is not named as this system does; as [`Self::check`].
+    /// [`Error::Program`] if a camera is not named as this system does; as [`Self::check`].
     pub(super) fn input(&self, system: &str) -> Result<Vec<String>> {
         let words = |words: &[&str]| -> Vec<String> {
             words.iter().map(|word| (*word).to_owned()).collect()
         };
         Ok(match self.kind {
             SourceKind::Stdin => words(&["-i", "pipe:0"]),
-            // Over UDP a camera's pictures tear where the network loses a packet.
+            // Over UDP, pictures are torn if the network loses a packet.
             SourceKind::Stream if self.is_rtsp() => {
                 words(&["-rtsp_transport", "tcp", "-i", &self.text])
             }
@@ -148,7 +148,7 @@ impl Address {
         })
     }
 
-    /// The error of reading from it.
+    /// An error of ffmpeg about this source.
     pub(super) fn error(&self, problem: LiveProblem) -> Error {
         Error::Program {
             path: PathBuf::from(self.to_string()),
@@ -167,7 +167,7 @@ impl fmt::Display for Address {
     }
 }
 
-/// What stands before `://`, where that is a scheme.
+/// The text before `://`, if that is a scheme.
 fn scheme(text: &str) -> Option<&str> {
     let (scheme, rest) = text.split_once("://")?;
     let word = scheme.starts_with(|c: char| c.is_ascii_alphabetic())
@@ -239,7 +239,7 @@ mod tests {
             let asked = format!("{name}?size=1920x1080&fps=30&format=mjpeg");
             assert_eq!(input(&asked, "linux"), full);
         }
-        // A calibration's size is asked for where none is, and of cameras alone.
+        // A calibration's size is requested if the text requests none, and of cameras alone.
         let sized = |text: &str| {
             let address = Address::parse(text).unwrap().or_of_size((640, 480));
             address.input("linux").unwrap().join(" ")
@@ -259,7 +259,10 @@ mod tests {
         for nameless in ["camera:", "camera:?fps=5"] {
             let address = Address::parse(nameless).unwrap();
             let error = address.check().unwrap_err();
-            assert_eq!(error.to_string(), format!("{nameless} names no camera"));
+            assert_eq!(
+                error.to_string(),
+                format!("{nameless} does not name a camera")
+            );
             assert!(error.hint().unwrap().contains("camera:0"), "{error:?}");
             assert!(address.input("linux").is_err());
         }

@@ -1,25 +1,25 @@
-//! What a camera is to give: `size=1920x1080&fps=30&format=mjpeg`, as it stands behind the `?` of its name.
+//! The settings of a camera: `size=1920x1080&fps=30&format=mjpeg`, as they follow the `?` after its name.
 
 use crate::CameraModeProblem as Problem;
 
-/// What is asked of a camera; the rest is its driver's to choose.
+/// The settings requested from a camera; its driver chooses the others.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct CameraMode {
     /// Width and height of its images.
     pub(super) size: Option<(u32, u32)>,
-    /// Frames a second, as they were written.
+    /// Frames per second, as they were written.
     fps: Option<String>,
-    /// How its images come, in ffmpeg's words.
+    /// Format of its images, by ffmpeg's name.
     format: Option<String>,
 }
 
-/// Formats that are codecs, which DirectShow is asked for by another option than pixels.
+/// Formats that are codecs, for which DirectShow has another option than for pixel formats.
 const CODECS: [&str; 3] = ["mjpeg", "h264", "hevc"];
-/// The most frames a second that a camera is asked for.
+/// The highest frame rate that is requested from a camera, 1/s.
 const FASTEST: f64 = 1000.0;
 
 impl CameraMode {
-    /// As it was written, any part of it; nothing is asked by nothing.
+    /// Parses the settings; each may be missing, and an empty text requests nothing.
     pub(super) fn parse(text: &str) -> Result<Self, Problem> {
         let mut mode = Self::default();
         for setting in text.split('&').filter(|setting| !setting.is_empty()) {
@@ -37,7 +37,7 @@ impl CameraMode {
         Ok(mode)
     }
 
-    /// ffmpeg's options for it, of a camera that is read through this device of its.
+    /// ffmpeg's options for them, for a camera read through this input device of ffmpeg's.
     pub(super) fn options(&self, device: &str) -> Vec<String> {
         let mut options = Vec::new();
         let mut add = |name: &str, value: String| options.extend([name.to_owned(), value]);
@@ -51,7 +51,7 @@ impl CameraMode {
         }
         match &self.fps {
             Some(fps) => add("-framerate", fps.clone()),
-            // Its default of 29.97 frames a second is one that cameras do not have.
+            // The device's default of 29.97 frames per second is one that cameras do not have.
             None if device == "avfoundation" => add("-framerate", "30".to_owned()),
             None => {}
         }

@@ -1,4 +1,4 @@
-//! The ffmpeg that decodes a source.
+//! The ffmpeg process that decodes a source.
 
 use super::address::Address;
 use super::ppm;
@@ -13,12 +13,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Lines of ffmpeg's complaints that are kept: the last ones say why it ended.
+/// Number of lines of ffmpeg's messages that are kept: the last ones say why it ended.
 const LINES: usize = 6;
 /// How long an ffmpeg that has closed its pipe may take to end.
 const GRACE: Duration = Duration::from_secs(2);
 
-/// A running ffmpeg, with the threads that read what it gives and says. Dropping it kills and buries it; the threads
+/// A running ffmpeg, with the threads that read its output and messages. Dropping it kills the process and waits for it; the threads
 /// end with its pipes.
 #[derive(Debug)]
 pub(super) struct Ffmpeg {
@@ -28,7 +28,7 @@ pub(super) struct Ffmpeg {
     listener: Option<JoinHandle<()>>,
 }
 
-/// How an ffmpeg ended.
+/// How an ffmpeg process ended.
 #[derive(Debug)]
 pub(super) struct FfmpegExit {
     pub(super) code: Option<i32>,
@@ -36,7 +36,7 @@ pub(super) struct FfmpegExit {
 }
 
 impl Ffmpeg {
-    /// Starts it. `old_names`: as before ffmpeg 5.1.
+    /// Starts it. With `old_names`, uses the option names from before ffmpeg 5.1.
     ///
     /// # Errors
     /// [`crate::Error::Program`].
@@ -44,13 +44,13 @@ impl Ffmpeg {
         let mut command = Command::new("ffmpeg");
         command
             .args(["-nostdin", "-hide_banner", "-v", "error"])
-            // No frame waits for others to be decoded with it.
+            // No frame waits until others have been decoded.
             .args(["-flags", "low_delay"])
-            // Nor does the first for twenty others to tell the rate, or for five seconds in which a sound might be found.
+            // Nor does the first wait for twenty others to determine the rate, or for five seconds in which audio might be found.
             .args(["-fpsprobesize", "0", "-analyzeduration", "500000"])
             .args(address.input(std::env::consts::OS)?)
             .args(["-map", "0:v:0"])
-            // None doubled or dropped to keep a rate.
+            // No frame is duplicated or dropped to keep a rate.
             .args([
                 if old_names { "-vsync" } else { "-fps_mode" },
                 "passthrough",
@@ -87,12 +87,12 @@ impl Ffmpeg {
         })
     }
 
-    /// Where its newest frame is.
+    /// The slot with its newest frame.
     pub(super) fn slot(&self) -> &Slot {
         &self.slot
     }
 
-    /// Waits for its end after its pipe was closed, and sees to it where it takes too long.
+    /// Waits until it ends after its pipe was closed, and kills it if that takes too long.
     pub(super) fn end(&mut self) -> FfmpegExit {
         let begun = Instant::now();
         let mut code = None;
@@ -111,7 +111,7 @@ impl Ffmpeg {
         FfmpegExit { code, said }
     }
 
-    /// Its last words so far.
+    /// The last lines that it has printed so far.
     pub(super) fn said(&self) -> Vec<String> {
         let said = self.said.lock().unwrap_or_else(PoisonError::into_inner);
         said.iter().cloned().collect()
@@ -120,13 +120,13 @@ impl Ffmpeg {
 
 impl Drop for Ffmpeg {
     fn drop(&mut self) {
-        // It may have ended by itself: then there is nothing to kill.
+        // If it has ended by itself, there is nothing to kill.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// Ctrl-C in a terminal goes to all its programs; this one's end is this program's to choose, after the frames at work.
+/// Ctrl-C in a terminal goes to all processes of the group. ffmpeg is kept out of it, so that it ends after the frames in progress.
 fn out_of_reach_of_ctrl_c(command: &mut Command) {
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(command, 0);
@@ -151,7 +151,7 @@ fn read_frames(pipe: impl Read, slot: &Slot) {
     slot.close(problem);
 }
 
-/// Keeps the last lines that it says.
+/// Keeps the last lines that it prints.
 fn listen(pipe: impl Read, said: &Mutex<VecDeque<String>>) {
     for line in BufReader::new(pipe)
         .split(b'\n')
@@ -169,8 +169,8 @@ fn listen(pipe: impl Read, said: &Mutex<VecDeque<String>>) {
     }
 }
 
-/// What ffmpeg says when a source is lost, though it may end with code 0 then; damaged frames are complained about too,
-/// and are no loss.
+/// What ffmpeg prints when a source is lost, even if it then ends with code 0. It also prints messages about damaged frames,
+/// which do not mean a loss.
 const LOSSES: [&str; 7] = [
     "Input/output error",
     "ends prematurely",
@@ -182,7 +182,7 @@ const LOSSES: [&str; 7] = [
 ];
 
 impl FfmpegExit {
-    /// Whether it ended because its source did.
+    /// Whether it ended because its source ended.
     pub(super) fn is_clean(&self) -> bool {
         self.code == Some(0) && !self.said_one_of(&LOSSES)
     }
@@ -192,7 +192,7 @@ impl FfmpegExit {
         self.said_one_of(&["'fps_mode'"])
     }
 
-    /// Whether one of the texts is in what it said.
+    /// Whether one of the texts is in its output.
     pub(super) fn said_one_of(&self, texts: &[&str]) -> bool {
         let mut said = self.said.iter();
         said.any(|line| texts.iter().any(|text| line.contains(text)))

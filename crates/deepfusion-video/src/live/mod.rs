@@ -1,8 +1,8 @@
-//! Cameras and streams as they come: the user's ffmpeg decodes, and only the newest frame is kept.
+//! Cameras and streams in real time: the user's ffmpeg decodes, and only the newest frame is kept.
 //!
-//! A network that is slower than its source must skip frames, or it would fall behind further and further. So a
-//! thread reads every frame into a slot of one: who takes from it gets the newest, and what was never
-//! taken is counted. Nothing here grows with time.
+//! A network that is slower than its source must skip frames, or it would fall further and further behind. So a
+//! thread reads every frame into a slot of one. Taking from it gives the newest frame; frames that were never
+//! taken are counted. Nothing here grows with time.
 
 mod address;
 mod camera_mode;
@@ -19,14 +19,14 @@ use crate::{Error, LiveFrameProblem, LiveProblem, Result};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What [`LiveSource::take`] found.
+/// The result of [`LiveSource::take`].
 #[derive(Debug)]
 pub enum NextFrame {
     /// The newest frame.
     Frame(LiveFrame),
-    /// None came while it waited.
+    /// No frame came while it waited.
     NotYet,
-    /// The stream has ended as streams do; every later call says so again.
+    /// The stream has ended normally; every later call returns this again.
     Ended,
 }
 
@@ -37,16 +37,16 @@ pub struct LiveSource {
     timeout: Duration,
     ffmpeg: Ffmpeg,
     size: Option<(u32, u32)>,
-    /// The mode of frames was named as before ffmpeg 5.1.
+    /// Whether ffmpeg needs the option names from before version 5.1.
     old_names: bool,
 }
 
 impl LiveSource {
-    /// Starts to read; whether anything comes is found by [`Self::take`]. A source that is silent for `timeout` is
-    /// taken for lost.
+    /// Starts to read; [`Self::take`] shows whether any frame comes. A source that is silent for `timeout` is
+    /// considered lost.
     ///
     /// # Errors
-    /// [`Error::Program`] where ffmpeg is not installed, or this system's cameras are named otherwise.
+    /// [`Error::Program`] if ffmpeg is not installed, or this system's cameras have other names.
     pub fn open(address: Address, timeout: Duration) -> Result<Self> {
         Ok(Self {
             ffmpeg: Ffmpeg::start(&address, false)?,
@@ -57,18 +57,18 @@ impl LiveSource {
         })
     }
 
-    /// Where it reads from.
+    /// The address it reads from.
     #[must_use]
     pub fn address(&self) -> &Address {
         &self.address
     }
 
-    /// The newest frame that was not taken yet, waiting for one no longer than `wait`. The last frame of a stream is
-    /// given before its end.
+    /// The newest frame that was not taken yet, waiting for at most `wait`. The last frame of a stream is
+    /// returned before its end.
     ///
     /// # Errors
-    /// [`Error::Program`] where the connection is refused or lost, nothing comes for the timeout, or the frames change
-    /// their size; it says how many frames had come, and what ffmpeg said.
+    /// [`Error::Program`] if the connection is refused or lost, no frame comes within the timeout, or the frames change
+    /// their size; it says how many frames had come, and what ffmpeg printed.
     pub fn take(&mut self, wait: Duration) -> Result<NextFrame> {
         match self.ffmpeg.slot().take(wait) {
             SlotState::Frame(frame) => {
@@ -85,12 +85,12 @@ impl LiveSource {
         }
     }
 
-    /// The pipe was closed: by the stream's end, or by what went wrong.
+    /// Called when the pipe was closed, by the stream's end or by an error.
     fn ended(&mut self, problem: Option<Arc<LiveFrameProblem>>) -> Result<NextFrame> {
         let end = self.ffmpeg.end();
         let came = self.ffmpeg.slot().arrived();
         if came == 0 && !self.old_names && end.knows_no_option() {
-            // The arguments are looked at before anything is opened: the source has not noticed.
+            // ffmpeg checks its arguments before it opens anything, so the source was not opened.
             self.old_names = true;
             self.ffmpeg = Ffmpeg::start(&self.address, true)?;
             return Ok(NextFrame::NotYet);
@@ -109,7 +109,7 @@ impl LiveSource {
         }))
     }
 
-    /// Nothing came for too long.
+    /// The error for a source that was silent for too long.
     fn silent(&self) -> Error {
         Error::Silent {
             address: self.address.to_string(),

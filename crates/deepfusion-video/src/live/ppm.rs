@@ -1,17 +1,17 @@
-//! Pictures as ffmpeg pipes them: each begins with its size, so that nothing has to be asked beforehand.
+//! Pictures as ffmpeg pipes them: each begins with its size, so that nothing has to be known beforehand.
 
 use crate::LiveFrameProblem;
 use image::RgbImage;
 use std::io::{BufRead, ErrorKind};
 
-/// Largest side of a frame: more is no camera's, but a stream that is no picture.
+/// Largest side of a frame: no camera has more, so the data cannot be a picture.
 const LARGEST: u32 = 1 << 15;
 
 /// Reads the next binary PPM of 8 bits; `None` at the end of the pipe, also within a picture. `spare` is a buffer to
 /// fill.
 ///
 /// # Errors
-/// Where something else comes than a picture, or reading fails.
+/// If the data is not a picture, or reading fails.
 pub(super) fn read(
     input: &mut impl BufRead,
     spare: Vec<u8>,
@@ -43,9 +43,9 @@ pub(super) fn read(
     }
 }
 
-/// The next word and the one blank that ends it; `None` at the end.
+/// The next word, with the one blank that ends it; `None` at the end.
 fn word(input: &mut impl BufRead) -> Result<Option<String>, LiveFrameProblem> {
-    /// Longer words are no header's.
+    /// Longest word of a header.
     const LONGEST: usize = 8;
     let mut word = String::new();
     let mut byte = [0];
@@ -78,7 +78,7 @@ mod tests {
             (first.dimensions(), first.as_raw().as_slice()),
             ((2, 1), &b"abcdef"[..])
         );
-        // A blank may be a pixel.
+        // A pixel may have the value of a blank.
         let second = read(&mut input, Vec::new()).unwrap().unwrap();
         assert_eq!(second.as_raw().as_slice(), b"\nxy");
         assert!(

@@ -1,4 +1,4 @@
-//! Room for one frame, between who reads the source and who looks at its frames.
+//! Space for one frame, between the thread that reads the source and the one that uses its frames.
 
 use crate::LiveFrameProblem;
 use image::RgbImage;
@@ -8,19 +8,19 @@ use std::time::{Duration, Instant, SystemTime};
 /// A frame of a live source.
 #[derive(Debug, Clone)]
 pub struct LiveFrame {
-    /// Its place in the stream, counted from 0: skipped frames leave gaps.
+    /// Its index in the stream, counted from 0: skipped frames leave gaps.
     pub number: u64,
-    /// What the camera saw.
+    /// The image.
     pub image: RgbImage,
-    /// When its last pixel was here.
+    /// When its last pixel was received.
     pub arrived: Instant,
-    /// The same on the wall's clock.
+    /// The same time on the system's clock.
     pub arrived_at: SystemTime,
-    /// Frames before it that nobody took.
+    /// Number of frames before it that were never taken.
     pub dropped: u64,
 }
 
-/// Holds the newest frame that nobody took, and nothing else.
+/// Holds the newest frame that has not been taken.
 #[derive(Debug)]
 pub(super) struct Slot {
     state: Mutex<State>,
@@ -37,20 +37,20 @@ struct State {
     closed: Option<Option<Arc<LiveFrameProblem>>>,
 }
 
-/// What a slot had.
+/// The result of taking from a slot.
 #[derive(Debug)]
 pub(super) enum SlotState {
     Frame(LiveFrame),
     Nothing {
-        /// How long there has been none, taken or not.
+        /// Time since the last frame, taken or not.
         silence: Duration,
     },
-    /// There will be no more; with what went wrong while reading.
+    /// No more frames will come; with the error, if reading failed.
     Closed(Option<Arc<LiveFrameProblem>>),
 }
 
 impl Slot {
-    /// Empty.
+    /// An empty slot.
     pub(super) fn new() -> Self {
         let state = State {
             newest: None,
@@ -65,7 +65,7 @@ impl Slot {
         }
     }
 
-    /// Puts the next frame in. One that is still there is dropped: its buffer is given back for the next.
+    /// Puts the next frame in. A frame that is still there is dropped: its buffer is returned for the next one.
     pub(super) fn put(&self, image: RgbImage) -> Vec<u8> {
         let (arrived, arrived_at) = (Instant::now(), SystemTime::now());
         let mut state = self.lock();
@@ -85,13 +85,13 @@ impl Slot {
         old.map_or_else(Vec::new, |frame| frame.image.into_raw())
     }
 
-    /// Says that no more will come; `problem` where that is a failure.
+    /// Says that no more will come; `problem` if that is a failure.
     pub(super) fn close(&self, problem: Option<LiveFrameProblem>) {
         self.lock().closed.get_or_insert(problem.map(Arc::new));
         self.changed.notify_all();
     }
 
-    /// Takes the frame out, waiting no longer than `wait` for one. What is left is given before the end is reported.
+    /// Takes the frame out, waiting for at most `wait`. A remaining frame is returned before the end is reported.
     pub(super) fn take(&self, wait: Duration) -> SlotState {
         let empty = |state: &mut State| state.newest.is_none() && state.closed.is_none();
         let waited = self.changed.wait_timeout_while(self.lock(), wait, empty);
@@ -105,13 +105,13 @@ impl Slot {
         }
     }
 
-    /// How many frames have come.
+    /// Number of frames that have come.
     pub(super) fn arrived(&self) -> u64 {
         self.lock().arrived
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        // Nothing in here panics half-way.
+        // No code panics halfway while it holds the lock.
         self.state.lock().unwrap_or_else(|e| e.into_inner())
     }
 }
@@ -136,7 +136,7 @@ mod tests {
         let slot = Slot::new();
         assert!(slot.put(picture(0)).is_empty());
         for value in 1..=200 {
-            // One comes in, one goes out: there is never more than one.
+            // One frame in, one out: there is never more than one.
             assert_eq!(slot.put(picture(value)), [value - 1; 6]);
         }
         let newest = frame(&slot);

@@ -1,7 +1,7 @@
-//! Some packets as an IVF file, which ffmpeg decodes: a picture a packet, numbered as the packets are.
+//! Some packets as an IVF file, which ffmpeg decodes to one picture per packet, numbered as the packets are.
 //!
 //! IVF is a header of 32 bytes (codec, size, rate, count) and, before each packet, its length and a time. ffmpeg names a picture by
-//! that time, so that one that it does not give is missed by its name.
+//! that time, so a picture that it does not write is noticed by its missing name.
 
 use super::Codec;
 use crate::program::{Printed, in_either_words, outcome};
@@ -12,12 +12,12 @@ use std::io::{BufWriter, Read, Write};
 use std::path::Path;
 
 const NAME: &str = "packets.ivf";
-/// Behind which the first packets are tried again, to see which of them it was.
+/// The file with the first packets, which are decoded again to find the wrong one.
 const TRIED: &str = "tried.ivf";
 const HEAD: u64 = 32;
-/// The unit of time of a packet's number, as the file's header says it.
+/// The unit of a packet's time, its number, as the file's header gives it.
 const RATE: &str = "1:25";
-/// What ffmpeg says of itself or of the disk, not of a packet.
+/// Messages of ffmpeg that are about itself or the disk, not about a packet.
 const OWN_PROBLEMS: [&str; 4] = [
     "Unknown decoder",
     "Decoder not found",
@@ -25,7 +25,7 @@ const OWN_PROBLEMS: [&str; 4] = [
     "Permission denied",
 ];
 
-/// Packets in a file of their own; the file goes away with this.
+/// Packets in a temporary file, which is deleted when this is dropped.
 #[derive(Debug)]
 pub(super) struct Batch<'a> {
     codec: Codec,
@@ -37,7 +37,7 @@ pub(super) struct Batch<'a> {
 }
 
 impl<'a> Batch<'a> {
-    /// An empty one in a folder, whose first packet will be the `first` of the stream.
+    /// An empty batch in a folder, whose first packet will be number `first` of the stream.
     ///
     /// # Errors
     /// [`Error::File`].
@@ -55,7 +55,7 @@ impl<'a> Batch<'a> {
         })
     }
 
-    /// How many packets it has.
+    /// Number of packets.
     pub(super) fn len(&self) -> usize {
         self.ends.len()
     }
@@ -74,11 +74,11 @@ impl<'a> Batch<'a> {
         Ok(())
     }
 
-    /// Decodes all into the folder, and takes the packets' file away. The inner error: the first packet's number that does not give
-    /// its picture, or a whole one, and why not.
+    /// Decodes all packets into the folder, and deletes their file. The inner error: the number of the first packet that does not give
+    /// a complete picture, and why.
     ///
     /// # Errors
-    /// [`Error::Program`] where ffmpeg is not installed; [`Error::File`].
+    /// [`Error::Program`] if ffmpeg is not installed; [`Error::File`].
     pub(super) fn decode(
         mut self,
         of: &Path,
@@ -94,12 +94,12 @@ impl<'a> Batch<'a> {
         Ok(outcome)
     }
 
-    /// The first packet that is wrong, by decoding fewer of them; `problem` is what all of them gave.
+    /// Finds the first wrong packet by decoding fewer of them; `problem` is the one found for all of them.
     fn first_wrong(&self, of: &Path, problem: PacketProblem) -> Result<(u64, PacketProblem)> {
         let aside = self.folder.join("tried");
         let path = self.folder.join(TRIED);
         let (mut whole, mut wrong) = (0, (self.len(), problem));
-        // What follows a wrong packet does not make it right.
+        // The packets after a wrong one cannot make it right.
         while wrong.0 - whole > 1 {
             let middle = (whole + wrong.0) / 2;
             std::fs::create_dir_all(&aside).map_err(|e| Error::file(&aside, e))?;
@@ -122,7 +122,7 @@ impl<'a> Batch<'a> {
         std::io::copy(&mut all, &mut File::create(path)?).map(|_| ())
     }
 
-    /// Decodes a file of the first `packets` into a folder: what was wrong, if something was.
+    /// Decodes a file of the first `packets` into a folder; returns what was wrong, if anything was.
     fn run(
         &self,
         of: &Path,
@@ -152,7 +152,7 @@ impl<'a> Batch<'a> {
         if said.contains("monoton") || said.contains("Invalid pts") {
             return Ok(Some(PacketProblem::Reordered));
         }
-        // The first line, without which part of ffmpeg it was and where that lay in memory.
+        // The first line, without the name and address of the part of ffmpeg that printed it.
         let line = said.lines().next().unwrap_or_default();
         let line = line.rsplit_once("] ").map_or(line, |(_, line)| line);
         Ok(Some(if line.is_empty() {
@@ -167,7 +167,7 @@ impl<'a> Batch<'a> {
 /// A packet's picture as PNG.
 ///
 /// # Errors
-/// [`Error::Program`] where ffmpeg is not installed. The inner error: why there is none.
+/// [`Error::Program`] if ffmpeg is not installed. The inner error: why there is none.
 pub(super) fn picture(
     codec: Codec,
     packet: &[u8],
@@ -183,20 +183,21 @@ pub(super) fn picture(
     })
 }
 
-/// Where an IVF file is: by its name, every picture of it wanted as a JPEG of its number; or here, its first picture wanted as PNG.
+/// The source and the output: a file by its name, with every picture written as a JPEG with its number; or bytes in memory, with the first
+/// picture written as PNG.
 enum Source<'a> {
     File(&'a str),
     Bytes(&'a [u8]),
 }
 
-/// Runs it on a file of packets; what it complains of says whether all is well.
+/// Runs it on a file of packets; its messages show whether all is well.
 fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Result<Printed> {
     let (name, bytes) = match source {
         Source::File(name) => (*name, None),
         Source::Bytes(bytes) => ("pipe:0", Some(*bytes)),
     };
     in_either_words(|mode| {
-        // Times as they are. A packet with an error in it gives no picture, rather than half of one.
+        // Times stay as they are. A packet with an error gives no picture, rather than half of one.
         let mut arguments = vec!["-v", "error", "-y", "-copyts", "-err_detect", "explode"];
         if let Some(decoder) = codec.decoder() {
             arguments.extend(["-c:v", decoder]);
@@ -212,7 +213,7 @@ fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Re
             "passthrough",
         ]);
         arguments.extend(match source {
-            // Pictures are named in the encoder's unit of time, which is the stream's own guess of its rate unless it is said.
+            // Pictures are named in the encoder's unit of time, which follows the guessed rate of the stream unless it is set.
             Source::File(_) => &[
                 "-q:v",
                 "2",
@@ -239,14 +240,14 @@ fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Re
     })
 }
 
-/// The file's header. The size stands in the packets, too, and counts there; so does the number of packets. 25 times a second:
+/// The file's header. The size is also in the packets, where it counts; so does the number of packets. The rate is 25 per second:
 /// [`RATE`].
 fn head(codec: Codec) -> [u8; HEAD as usize] {
     let mut head = [0; HEAD as usize];
     head[..4].copy_from_slice(b"DKIF");
     head[6] = HEAD as u8;
     head[8..12].copy_from_slice(codec.fourcc());
-    // Width and height: some number.
+    // Width and height are arbitrary.
     (head[12], head[14]) = (64, 64);
     (head[16], head[20]) = (25, 1);
     head

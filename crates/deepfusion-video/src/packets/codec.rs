@@ -1,23 +1,23 @@
-//! Which codecs streams of messages have, and where decoding can begin.
+//! The supported codecs of streams in messages, and where decoding can begin.
 
 use super::nal::units;
 
-/// The codec of a stream whose packets lie in messages, a picture in each.
+/// The codec of a stream whose packets are in messages, one picture in each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Codec {
-    /// H.264 as Annex B has it: units behind start codes.
+    /// H.264 in Annex B: units after start codes.
     H264,
-    /// H.265 (HEVC), likewise.
+    /// H.265 (HEVC) in Annex B.
     H265,
-    /// VP9, a frame a packet.
+    /// VP9, one frame per packet.
     Vp9,
-    /// AV1, a temporal unit a packet.
+    /// AV1, one temporal unit per packet.
     Av1,
 }
 
 impl Codec {
-    /// By a name that messages have for it: the codec's, or that of an encoder in ffmpeg (`libx264`, `hevc_nvenc`). What stands
-    /// behind a semicolon or a space is about pixels. `None` for any other, such as `jpeg`.
+    /// The codec by a name used in messages: the codec's own, or that of an encoder in ffmpeg (`libx264`, `hevc_nvenc`). The text
+    /// after a semicolon or a space is about pixels. `None` for any other, such as `jpeg`.
     #[must_use]
     pub fn named(format: &str) -> Option<Self> {
         let name = format.split([';', ' ']).next().unwrap_or_default();
@@ -73,7 +73,7 @@ impl Codec {
         }
     }
 
-    /// ffmpeg's decoder, where an IVF file does not say it: those two codecs are not usual in one.
+    /// ffmpeg's decoder, if an IVF file does not give it: these two codecs are not usual in IVF.
     pub(super) fn decoder(self) -> Option<&'static str> {
         match self {
             Self::H264 => Some("h264"),
@@ -83,15 +83,15 @@ impl Codec {
     }
 }
 
-/// VP9's uncompressed header, 6.2: a mark of two bits, the profile's two, `show_existing_frame` and `frame_type`, 0 for a key frame;
-/// profile 3 has a bit more in front.
+/// VP9's uncompressed header, 6.2: a two-bit mark, the profile's two bits, `show_existing_frame` and `frame_type`, 0 for a key frame;
+/// profile 3 has one more bit before them.
 fn is_vp9_key(first: u8) -> bool {
     let profile_3 = first & 0b0011_0000 == 0b0011_0000;
     let bits = if profile_3 { first << 1 } else { first };
     first >> 6 == 2 && bits & 0b0000_1100 == 0
 }
 
-/// AV1's units of low overhead, 5.3: a header, and a length of seven bits a byte.
+/// AV1's low-overhead units, 5.3: a header, and a length with seven bits per byte.
 fn has_sequence_header(packet: &[u8]) -> bool {
     let mut rest = packet;
     while let Some((&head, behind)) = rest.split_first() {
@@ -153,7 +153,7 @@ mod tests {
         // VPS, SPS, PPS, IDR_W_RADL.
         assert!(Codec::H265.begins(&of(&[32 << 1, 33 << 1, 34 << 1, 19 << 1])));
         assert!(!Codec::H265.begins(&of(&[1 << 1])));
-        // The first bytes of what libvpx and SVT-AV1 wrote.
+        // The first bytes of streams written by libvpx and SVT-AV1.
         assert!(Codec::Vp9.begins(&[0x82, 0x49, 0x83, 0x42]));
         assert!(!Codec::Vp9.begins(&[0x86, 0x00]));
         assert!(Codec::Av1.begins(&[0x12, 0x00, 0x0a, 0x0a, 0, 0, 0, 3]));

@@ -1,30 +1,30 @@
-//! What of H.264 shows that a packet is missing, or that pictures change places: the count of its frames and the kind of its slices
-//! (ITU-T H.264, 7.3.2.1 and 7.3.3). ffmpeg conceals the one and allows the other.
+//! The parts of H.264 that show a missing packet or reordered pictures: the counter of its frames and the type of its slices
+//! (ITU-T H.264, 7.3.2.1 and 7.3.3). ffmpeg conceals the first and allows the second.
 
 use super::nal::units;
 use crate::PacketProblem;
 
-/// Looks at a stream's packets in their order.
+/// Checks a stream's packets in their order.
 #[derive(Debug, Default)]
 pub(super) struct PacketWatch {
     set: Option<ParameterSet>,
-    /// The count of the last picture that others refer to.
+    /// The counter of the last picture that others refer to.
     last: Option<u32>,
 }
 
-/// Of a sequence parameter set.
+/// Values of a sequence parameter set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct ParameterSet {
-    /// The counter has so many bits.
+    /// Number of bits of the counter.
     bits: u32,
-    /// Gaps are on purpose: the encoder leaves pictures out.
+    /// Whether gaps are intended: the encoder leaves pictures out.
     gaps: bool,
-    /// Three planes of colour, each coded by itself.
+    /// Whether there are three colour planes, each coded separately.
     planes: bool,
 }
 
 impl PacketWatch {
-    /// Looks at the next packet: what is wrong with it, if something is.
+    /// Checks the next packet; returns what is wrong with it, if anything is.
     pub(super) fn next(&mut self, packet: &[u8]) -> Result<(), PacketProblem> {
         for unit in units(packet) {
             let (kind, referred) = (unit[0] & 31, unit[0] & 0b0110_0000 != 0);
@@ -61,7 +61,7 @@ impl PacketWatch {
 
 /// Type and `frame_num` of a slice.
 fn slice(unit: &[u8], set: ParameterSet) -> Option<(u32, u32)> {
-    // A dozen bytes do.
+    // A dozen bytes are enough.
     let mut bits = Bits::of(unit.get(1..)?, 32);
     let _first_macroblock = bits.exp_golomb()?;
     let kind = bits.exp_golomb()?;
@@ -72,14 +72,14 @@ fn slice(unit: &[u8], set: ParameterSet) -> Option<(u32, u32)> {
     Some((kind, bits.take(set.bits)?))
 }
 
-/// A sequence parameter set, up to what matters.
+/// Reads a sequence parameter set, up to the last value that matters.
 fn parameters(unit: &[u8]) -> Option<ParameterSet> {
     let mut bits = Bits::of(unit.get(1..)?, usize::MAX);
     let profile = bits.take(8)?;
     bits.take(16)?;
     let _id = bits.exp_golomb()?;
     let mut planes = false;
-    // Profiles with formats of colour.
+    // Profiles with chroma formats.
     if [100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135].contains(&profile) {
         let colours = bits.exp_golomb()?;
         if colours == 3 {
@@ -119,7 +119,7 @@ fn parameters(unit: &[u8]) -> Option<ParameterSet> {
     })
 }
 
-/// 7.3.2.1.1.1, for its length alone.
+/// Skips a scaling list (7.3.2.1.1.1).
 fn skip_scaling(bits: &mut Bits, size: u32) -> Option<()> {
     let (mut last, mut next) = (8_i64, 8_i64);
     for _ in 0..size {
@@ -139,7 +139,7 @@ fn skip_scaling(bits: &mut Bits, size: u32) -> Option<()> {
     Some(())
 }
 
-/// The bits of a unit, those that keep start codes out of it taken away.
+/// The bits of a unit, without those that keep start codes out of it.
 struct Bits {
     bytes: Vec<u8>,
     at: usize,
@@ -171,7 +171,7 @@ impl Bits {
         Some(value)
     }
 
-    /// A number without a sign of as many bits as it needs, 9.1.
+    /// An unsigned Exp-Golomb number, 9.1.
     fn exp_golomb(&mut self) -> Option<u32> {
         let mut zeros = 0;
         while self.take(1)? == 0 {
@@ -199,10 +199,10 @@ mod tests {
         ] {
             let error = watch.next(packet).unwrap_err();
             assert_eq!(error, PacketProblem::Empty, "{packet:?}");
-            assert_eq!(error.to_string(), "it holds no picture");
+            assert_eq!(error.to_string(), "it contains no picture");
         }
         assert!(watch.set.is_none());
-        // A slice without parameters says nothing.
+        // A slice without parameters cannot be checked.
         assert_eq!(watch.next(&[0, 0, 1, 0x41, 0]), Ok(()));
     }
 
@@ -218,13 +218,13 @@ mod tests {
         assert_eq!(Bits::of(&[0; 9], 9).exp_golomb(), None);
     }
 
-    /// A set that was written by hand after 7.3.2.1.1: Baseline, id 0, a counter of 4 bits, order type 2, one reference, no gaps.
+    /// A set written by hand from 7.3.2.1.1: Baseline, id 0, a counter of 4 bits, order type 2, one reference, no gaps.
     fn baseline(gaps: u8) -> Vec<u8> {
-        // ue(0) ue(0) ue(2) ue(1) gaps, and the mark of the end: 1 1 011 010 g 1.
+        // ue(0) ue(0) ue(2) ue(1) gaps, and the end mark: 1 1 011 010 g 1.
         vec![0, 0, 1, 0x67, 66, 0, 30, 0b1101_1010, gaps << 7 | 0x40]
     }
 
-    /// A slice: first macroblock 0, a type, set 0, a count of 4 bits; the types P (0) and B (1) have the codes 1 and 010.
+    /// A slice: first macroblock 0, a type, set 0, a counter of 4 bits; the types P (0) and B (1) have the codes 1 and 010.
     fn picture(kind: u8, header: u8, count: u8) -> Vec<u8> {
         let (bits, length) = if kind == 0 { (0b111, 3) } else { (0b1_0101, 5) };
         let word: u16 = (bits << 4 | u16::from(count)) << (16 - length - 4);
@@ -251,13 +251,13 @@ mod tests {
         for count in (1..=15).chain(0..4) {
             assert_eq!(watch.next(&picture(0, 0x41, count)), Ok(()), "{count}");
         }
-        // One that nothing refers to, then the next with the same count.
+        // One that no picture refers to, then the next with the same counter.
         assert_eq!(watch.next(&picture(0, 0x01, 4)), Ok(()));
         assert_eq!(watch.next(&picture(0, 0x41, 4)), Ok(()));
         let error = watch.next(&picture(0, 0x41, 6)).unwrap_err();
         assert_eq!(error, PacketProblem::Gap);
         assert!(error.to_string().contains("missing"), "{error}");
-        // Where the encoder leaves some out on purpose, it is none.
+        // If the encoder leaves some out intentionally, none is missing.
         assert_eq!(first(1).next(&picture(0, 0x41, 6)), Ok(()));
         let error = first(0).next(&picture(1, 0x01, 1)).unwrap_err();
         assert_eq!(error, PacketProblem::Reordered);

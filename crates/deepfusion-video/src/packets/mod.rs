@@ -1,9 +1,9 @@
-//! The frames of a stream whose packets lie in a recording's messages, as files.
+//! The frames of a stream whose packets are in a recording's messages, as files.
 //!
-//! As of a video all frames are decoded once, in order, into a folder of JPEGs (`cache`); a frame is found by its packet's number
-//! alone. Packets go to ffmpeg by the hundred, from a key frame on (`batch`), so that nothing grows with the recording. What is
-//! wrong with one is said with its number: ffmpeg names each picture by its packet, and what it would rather conceal of H.264 is
-//! read here (`h264`).
+//! As for a video, all frames are decoded once, in order, into a folder of JPEGs (`cache`); a frame is found by its packet's number
+//! alone. Packets go to ffmpeg in hundreds, starting at a key frame (`batch`), so that memory does not grow with the recording. An
+//! error names the packet by its number: ffmpeg names each picture by its packet, and errors in H.264 that ffmpeg would conceal are
+//! detected here (`h264`).
 
 mod batch;
 mod codec;
@@ -19,25 +19,25 @@ use batch::Batch;
 use deepfusion_hint::Hint;
 use std::path::{Path, PathBuf};
 
-/// Packets that are decoded together, at least: from there on a key frame begins the next.
+/// Least number of packets that are decoded together; the next key frame after them begins a new batch.
 const TOGETHER: usize = 250;
 
-/// Which stream it is.
+/// Identifies a stream.
 #[derive(Debug, Clone)]
 pub struct PacketStream {
-    /// The recording, for messages and to notice that it changed: a file, or a folder of files.
+    /// Path of the recording, for messages and to notice that it changed: a file, or a folder of files.
     pub file: PathBuf,
     /// The stream's name in it, such as a topic.
     pub name: String,
     /// Its codec.
     pub codec: Codec,
-    /// How many of its messages come before the first key frame, and are no packets here.
+    /// Number of messages before the first key frame, which are not packets here.
     pub before: u64,
-    /// How many packets there are from there on.
+    /// Number of packets from the first key frame on.
     pub count: usize,
 }
 
-/// A stream's frames: decoded when the first of them is asked for.
+/// A stream's frames: decoded when the first of them is requested.
 #[derive(Debug)]
 pub struct PacketFrames {
     stream: PacketStream,
@@ -46,10 +46,10 @@ pub struct PacketFrames {
 }
 
 impl PacketFrames {
-    /// A stream whose frames will be kept in the folder `cache`, such as [`frames_folder`](crate::frames_folder) names.
+    /// A stream whose frames will be kept in the folder `cache`, such as [`frames_folder`](crate::frames_folder) gives.
     ///
     /// # Errors
-    /// [`Error::File`] where the working folder is gone.
+    /// [`Error::File`] if the working folder does not exist.
     pub fn new(stream: PacketStream, cache: &Path) -> Result<Self> {
         // ffmpeg runs in other folders.
         let cache = std::path::absolute(cache).map_err(|e| Error::file(cache, e))?;
@@ -60,13 +60,13 @@ impl PacketFrames {
         })
     }
 
-    /// The JPEG of a packet's picture, counted from 0. The first call decodes all `packets`, from the first key frame on, unless that
-    /// was done before.
+    /// Path of the JPEG of a packet's picture, counted from 0. The first call decodes all `packets`, starting at the first key frame, unless
+    /// that was done before.
     ///
     /// # Errors
     /// Those of `packets`; [`Error::Packet`] for one that is damaged, does not follow the one before it, or is a B-frame;
-    /// [`Error::Program`] without ffmpeg; [`Error::File`] where frames cannot be kept; [`Error::NotDecoded`] in the same words for every
-    /// frame that is asked for after that.
+    /// [`Error::Program`] without ffmpeg; [`Error::File`] if frames cannot be kept; [`Error::NotDecoded`] with the same message for every
+    /// frame that is requested after that.
     pub fn frame<E, P>(
         &self,
         index: u64,

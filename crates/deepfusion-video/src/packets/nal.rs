@@ -1,6 +1,6 @@
 //! The units of a packet of H.264 or H.265 in Annex B.
 
-/// A packet's units without their start codes, none of them empty.
+/// A packet's units without their start codes; none is empty.
 pub(super) fn units(packet: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = behind_start(packet);
     std::iter::from_fn(move || {
@@ -12,7 +12,7 @@ pub(super) fn units(packet: &[u8]) -> impl Iterator<Item = &[u8]> {
     .filter(|unit| !unit.is_empty())
 }
 
-/// What follows the first start code, 0 0 1.
+/// The bytes after the first start code, 0 0 1.
 fn behind_start(bytes: &[u8]) -> Option<&[u8]> {
     let at = bytes.windows(3).position(|w| w == [0, 0, 1])?;
     Some(&bytes[at + 3..])

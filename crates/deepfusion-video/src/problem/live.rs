@@ -1,4 +1,4 @@
-//! Why a live source cannot be read, or not any more, and why its settings are none.
+//! Why a live source cannot be read, or no longer, and what is wrong with its settings.
 
 use deepfusion_hint::count_of;
 use std::io;
@@ -16,37 +16,37 @@ pub enum SourceKind {
     Stdin,
 }
 
-/// Why a live source cannot be read, or not any more, as the end of a sentence about ffmpeg.
+/// Why a live source cannot be read, or no longer, as the end of a sentence that begins with ffmpeg.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LiveProblem {
-    /// A camera is given by number where cameras have names.
+    /// A camera is given by number on a system that uses names.
     #[error("knows cameras by name here, not by number")]
     CameraNumber,
-    /// ffmpeg knows no way to this system's cameras.
-    #[error("reads no cameras on this system")]
+    /// ffmpeg cannot read cameras on this system.
+    #[error("does not read cameras on this system")]
     NoCameras,
-    /// Its frames have changed their size.
-    #[error("gave frames of {}x{}, and now of {}x{}", first.0, first.1, now.0, now.1)]
+    /// The frames have changed their size.
+    #[error("gave frames of {}x{}, and now gives {}x{}", first.0, first.1, now.0, now.1)]
     Size {
         /// Width and height of the first frame.
         first: (u32, u32),
         /// Width and height of this one.
         now: (u32, u32),
     },
-    /// What comes is no frame.
-    #[error("cannot be read: {0}")]
+    /// The data is not a frame.
+    #[error("cannot be read from: {0}")]
     Frame(#[source] Arc<LiveFrameProblem>),
-    /// ffmpeg ended, and the source should not have.
+    /// ffmpeg ended, although the source should not have.
     #[error("{}: {}{}", happened(*frames), ended(*code), quoted(said))]
     Lost {
-        /// What kind of source it is.
+        /// Kind of the source.
         kind: SourceKind,
-        /// How many frames had come.
+        /// Number of frames received.
         frames: u64,
         /// ffmpeg's exit code, if it ended by itself.
         code: Option<i32>,
-        /// What it said last, without the source's password.
+        /// Its last messages, without the source's password.
         said: Vec<String>,
     },
 }
@@ -61,7 +61,7 @@ fn happened(frames: u64) -> String {
 fn ended(code: Option<i32>) -> String {
     match code {
         Some(code) => format!("ended with code {code}"),
-        None => "was ended".into(),
+        None => "was killed".into(),
     }
 }
 
@@ -69,18 +69,18 @@ impl LiveProblem {
     pub(crate) fn hint(&self) -> &'static str {
         match self {
             Self::CameraNumber => {
-                "`ffmpeg -list_devices true -f dshow -i dummy` lists them: camera:NAME"
+                "give camera:NAME; `ffmpeg -list_devices true -f dshow -i dummy` lists the names"
             }
-            Self::NoCameras => "give a stream's address, or pipe a stream in and give -",
-            Self::Size { .. } => "start again: a camera of another size has other intrinsics",
-            Self::Frame(_) => "a newer ffmpeg may know the stream better",
+            Self::NoCameras => "give a stream's address, or - for a stream on standard input",
+            Self::Size { .. } => "start again: images of another size have other intrinsics",
+            Self::Frame(_) => "use a newer ffmpeg, which may know the stream better",
             Self::Lost { frames: 1.., .. } => {
-                "what was written is whole; start again when the source is back"
+                "start again when the source is back; what was written is complete"
             }
             Self::Lost {
                 kind: SourceKind::Stdin,
                 ..
-            } => "pipe a stream that ffmpeg knows: Motion-JPEG, MPEG-TS, YUV4MPEG, Matroska",
+            } => "pipe a format that ffmpeg knows: Motion-JPEG, MPEG-TS, YUV4MPEG, Matroska",
             Self::Lost { said, .. } if asks_for_password(said) => {
                 "give name and password: rtsp://NAME:PASSWORD@HOST/…"
             }
@@ -92,7 +92,7 @@ impl LiveProblem {
                  `ffmpeg -sources` those ffmpeg knows"
             }
             Self::Lost { .. } => {
-                "is the source running, and the address right? `ffplay ADDRESS` shows what it sends"
+                "check that the source is running and the address is right; `ffplay ADDRESS` shows what it sends"
             }
         }
     }
@@ -103,7 +103,7 @@ fn asks_for_password(said: &[String]) -> bool {
     said.iter().any(refused)
 }
 
-/// What it said, to be put behind what happened.
+/// ffmpeg's messages, to follow what happened.
 pub(crate) fn quoted(said: &[String]) -> String {
     if said.is_empty() {
         String::new()
@@ -116,37 +116,37 @@ pub(crate) fn quoted(said: &[String]) -> String {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LiveFrameProblem {
-    /// It does not begin as a picture.
-    #[error("a frame that does not begin with P6")]
+    /// The frame does not begin as a picture.
+    #[error("the frame does not begin with P6")]
     Magic,
-    /// Its size is that of no picture.
-    #[error("a frame's size of {0:?}")]
+    /// The size of the frame is invalid.
+    #[error("invalid frame size {0:?}")]
     Size(String),
-    /// What should be its header goes on and on.
-    #[error("a frame without a header")]
+    /// The header of the frame does not end.
+    #[error("the frame has no header")]
     Header,
     /// The pipe cannot be read.
     #[error(transparent)]
     Pipe(#[from] io::Error),
 }
 
-/// Why it is not understood what a camera is to give.
+/// What is wrong with the settings of a camera.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraModeProblem {
-    /// There is no such setting.
+    /// The setting does not exist.
     #[error("a camera has no setting `{0}`")]
     Unknown(String),
     /// A setting is given twice.
     #[error("setting `{0}` is given twice")]
     Again(String),
-    /// That is no size.
+    /// The size is invalid.
     #[error("setting `size`: expected width and height in pixels, such as 1920x1080, found `{0}`")]
     Size(String),
-    /// That is no rate.
+    /// The rate is invalid.
     #[error("setting `fps`: expected frames a second, such as 30, at most 1000, found `{0}`")]
     Rate(String),
-    /// That is no format's name.
+    /// The format is not a name.
     #[error("setting `format`: expected a format by ffmpeg's name, such as mjpeg, found `{0}`")]
     Format(String),
 }

@@ -6,31 +6,31 @@ use deepfusion_hint::{Hint, count_of};
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PacketProblem {
-    /// Pictures come in another order than their packets.
+    /// The pictures' order differs from that of their packets.
     #[error("its picture is shown before that of an earlier message (a B-frame)")]
     Reordered,
-    /// Its beginning is not whole.
+    /// The beginning of the packet is incomplete.
     #[error("it is cut off within a slice's header")]
     Cut,
-    /// It needs one that is not there.
-    #[error("a message before it is missing, which its picture refers to")]
+    /// The packet needs another one that is missing.
+    #[error("an earlier message that its picture refers to is missing")]
     Gap,
-    /// It is something else than a picture.
-    #[error("it holds no picture")]
+    /// The packet is not a picture.
+    #[error("it contains no picture")]
     Empty,
-    /// The decoder makes nothing of it, and does not say why.
+    /// The decoder gives no picture, and does not say why.
     #[error("it gives no picture")]
     NoPicture,
-    /// The decoder makes nothing of the stream's first packet.
+    /// The decoder gives no picture for the stream's first packet.
     #[error("it gives no picture: {said}")]
     NoFirstPicture {
-        /// What the decoder said.
+        /// The decoder's message.
         said: String,
     },
-    /// The decoder finds it damaged.
+    /// The decoder finds the packet damaged.
     #[error("it is damaged, or one before it is missing: {said}")]
     Damaged {
-        /// What the decoder said.
+        /// The decoder's message.
         said: String,
     },
     /// The stream has fewer packets than when it was opened.
@@ -40,7 +40,7 @@ pub enum PacketProblem {
         if *counted == 1 { "was" } else { "were" }
     )]
     Ended {
-        /// How many there were.
+        /// The number counted at that time.
         counted: usize,
     },
 }
@@ -50,7 +50,7 @@ impl Hint for PacketProblem {
         let text = match self {
             Self::Reordered => "encode without B-frames (libx264: -bf 0, or -tune zerolatency)",
             _ => {
-                "cut the recording before that message, or after it at a key frame (`rosbag filter`; messages are counted from 0), and use the parts"
+                "cut the recording before that message, or at a key frame after it (with `rosbag filter`; messages are counted from 0), and use the parts"
             }
         };
         Some(text.to_owned())

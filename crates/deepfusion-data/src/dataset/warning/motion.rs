@@ -232,7 +232,7 @@ mod tests {
                     log: "trip.csv".into(),
                     note: TableNote::HeaderAgain { more: 1 }.into(),
                 },
-                "trip.csv: the header stands once more among the rows",
+                "trip.csv: the header is repeated once among the rows",
             ),
             (
                 MotionWarning::Bridged {
