@@ -78,7 +78,7 @@ fn an_option_of_another_layout_is_refused() {
     ] {
         let refused = run(folder.path(), &format!("simulate --out new {args}"));
         assert_eq!(refused.code, 2, "{}", refused.stderr);
-        for part in [option, "not for this layout", layout] {
+        for part in [option, "does not apply to this layout", layout] {
             assert!(refused.stderr.contains(part), "{part}: {}", refused.stderr);
         }
         assert!(!folder.path().join("new").exists());
@@ -268,7 +268,7 @@ fn bags_of_ros_2_are_not_written() {
     ok(at, "simulate --out sim --frames 4 --size 64x48");
     for name in ["foo.mcap", "foo.DB3"] {
         let args = format!("data convert sim {name}");
-        fails(at, &args, &[name, "read, not written", ".bag"]);
+        fails(at, &args, &[name, "can be read, but not written", ".bag"]);
         assert!(!at.join(name).exists());
     }
 }
@@ -392,7 +392,7 @@ fn a_damaged_bag_does_not_hide_the_others() {
         "sim: 1 of 2 recordings cannot be read",
         "hint: each is listed with its reason",
         "keeps its own ending",
-        "or give the others by themselves",
+        "or give only the others",
     ] {
         assert!(listed.stderr.contains(part), "{part}: {}", listed.stderr);
     }

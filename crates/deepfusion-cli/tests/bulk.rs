@@ -401,7 +401,7 @@ fn the_pictures_of_a_recording_become_a_video() {
     let predict = "predict --model run sim --save video";
     // Before any work: a shard has no video to show, and without ffmpeg there is none.
     let shard = format!("{predict} --out out --shard 1/2");
-    fails(at, &shard, &["--save video", "a shard sees only some"]);
+    fails(at, &shard, &["--save video", "a shard has only some"]);
     let without = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
         .current_dir(at)
         .args(format!("{predict} --out out").split_whitespace())

@@ -174,7 +174,7 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     assert!(
         printed
             .stderr
-            .contains("it gets what the other recordings show"),
+            .contains("using the offset of the other recordings"),
         "{}",
         printed.stderr
     );

@@ -132,7 +132,7 @@ fn runs_are_reported_kept_and_compared() {
     fails(
         at,
         "compare a printed.json --pictures sim --out d.html",
-        &["pictures need a run's folder"],
+        &["expected a run's folder for the pictures"],
     );
     fs::write(at.join("broken.json"), &printed[..printed.len() / 2]).unwrap();
     fails(at, "compare broken.json", &["no evaluation"]);

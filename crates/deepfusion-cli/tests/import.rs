@@ -101,7 +101,7 @@ fn a_log_beside_its_images_is_a_drive() {
     assert!(printed.stdout.contains("fx 46.19"), "{}", printed.stdout);
     assert!(!printed.stderr.contains("radians"), "{}", printed.stderr);
     let in_radians = ok(at, "data inspect beside --hfov 1.2").stderr;
-    assert!(in_radians.contains("--hfov 69, if"), "{in_radians}");
+    assert!(in_radians.contains("--hfov 69 if"), "{in_radians}");
 
     fails(at, &format!("{import} --out drive"), &["speed.csv"]);
     fails(
@@ -109,7 +109,11 @@ fn a_log_beside_its_images_is_a_drive() {
         "data import torque.csv --video none.mp4 --out x",
         &["none.mp4"],
     );
-    fails(at, "data import torque.csv --out x", &["neither a video"]);
+    fails(
+        at,
+        "data import torque.csv --out x",
+        &["no video and no images"],
+    );
     fs::write(at.join("torque.csv"), log.join("\n").replace("(km/h)", "")).unwrap();
     fails(
         at,

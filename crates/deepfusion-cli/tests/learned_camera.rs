@@ -60,7 +60,7 @@ fn a_drive_without_a_camera_is_learned_from_and_looked_at() {
     fails(
         at,
         "train --data sim --intrinsics learn --steps 2",
-        &["says what its camera is", "leave --intrinsics learn out"],
+        &["says what its camera is", "leave out --intrinsics learn"],
     );
 
     let train = "train --data drive --preset tiny --size 96x64 --batch 2 --init none --steps 2";

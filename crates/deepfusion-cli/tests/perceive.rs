@@ -338,7 +338,7 @@ fn what_is_wrong_is_named() {
     fails(
         at,
         &format!("predict --model run {picture} --out theirs/0000000003_depth.png"),
-        &["a file, and a folder", "--out"],
+        &["expected a folder for the outputs", "--out"],
     );
     std::fs::write(at.join("wrong.toml"), "min_pixel = 3\n").unwrap();
     let args = format!("perceive --model run {DRIVE} --out c --config wrong.toml");
@@ -380,7 +380,7 @@ fn what_is_wrong_is_named() {
         &format!("perceive --model run {images} --intrinsics 186,186,157,44 --out d"),
     );
     assert_eq!(run_.code, 1);
-    for part in ["0000000004.png", "run it anew with --overwrite"] {
+    for part in ["0000000004.png", "run it again with --overwrite"] {
         assert!(run_.stderr.contains(part), "{part}: {}", run_.stderr);
     }
     let lines = std::fs::read_to_string(at.join("d/targets.jsonl")).unwrap();

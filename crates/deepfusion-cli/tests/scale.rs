@@ -103,7 +103,7 @@ fn a_zoom_is_noticed_and_depth_brought_back() {
     fails(
         at,
         &format!("predict --model run {DRIVE} --shard 1/2 --correct-scale --out none"),
-        &["a shard sees only some"],
+        &["a shard has only some"],
     );
     assert!(!at.join("none").exists());
 }

@@ -79,7 +79,7 @@ fn a_packed_network_stands_for_its_run() {
         "{}",
         table.stdout
     );
-    assert!(table.stderr.contains("not kept"), "{}", table.stderr);
+    assert!(table.stderr.contains("not saved"), "{}", table.stderr);
     let kept = fs::read_dir(at.join("packed")).unwrap().count();
     assert_eq!(kept, 2, "only the two files");
     fails(
@@ -122,7 +122,7 @@ fn a_packed_network_stands_for_its_run() {
     // The same again finds everything there.
     let there = ok(at, &format!("predict {model} {image} --save npy --out b"));
     assert!(
-        there.stderr.contains("1 were there already"),
+        there.stderr.contains("1 existed already"),
         "{}",
         there.stderr
     );
@@ -354,7 +354,8 @@ fn what_is_embedded_is_listed_and_used() {
     if names.contains(&deepfusion_weights::DEFAULT) {
         let run = ok(at, "predict sim --out unasked");
         assert!(
-            run.stderr.contains("no --model: the embedded network"),
+            run.stderr
+                .contains("no --model given: using the embedded network"),
             "{}",
             run.stderr
         );

@@ -269,7 +269,7 @@ fn a_stopped_run_is_saved_and_does_not_end_with_0() {
     let train = format!("train --data sim {SMALL} --steps 100000 --out run");
     let said = stopped(&train, "-TERM", true);
     assert!(
-        said.contains("hint: go on with: deepfusion train --out run --resume"),
+        said.contains("hint: continue with: deepfusion train --out run --resume"),
         "{said}"
     );
     assert!(at.join("run/last.safetensors").is_file());
@@ -394,7 +394,7 @@ fn options_replace_their_own_part_of_a_file() {
     let fits = deepfusion_weights::names().any(|name| name == "tiny");
     let said = second
         .stderr
-        .contains("starts from nothing, as the configuration names no init (--init tiny");
+        .contains("starting from random weights, as the configuration has no `init` (--init tiny");
     assert_eq!(said, fits, "{}", second.stderr);
     assert_eq!(data("second")["paths"][0], path("sim"));
     assert_eq!(data("second")["validation"][0], path("val"));

@@ -46,7 +46,7 @@ fn it_prints_its_address_answers_and_ends() {
         second.stderr,
         format!(
             "error: 127.0.0.1:{port}: the port is in use\n\
-             hint: give another --port, or --port 0 for any that is free\n"
+             hint: give another --port, or --port 0 for any free one\n"
         )
     );
 
