@@ -215,7 +215,7 @@ fn a_broken_frame_is_reported_and_new_ones_appear() {
     ));
     browser.key("ArrowRight");
     browser.wait_for(&format!(
-        "{}.innerText.includes('half-written')",
+        "{}.innerText.includes('incomplete')",
         problem("picture")
     ));
     browser.key("Home");
