@@ -94,7 +94,7 @@ fn runs_are_reported_kept_and_compared() {
     assert_eq!(
         kept(&at.join("a")).len(),
         1,
-        "the same again replaces its file"
+        "repeating an evaluation replaces its file"
     );
 
     // Side by side.

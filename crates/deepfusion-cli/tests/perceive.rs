@@ -290,7 +290,7 @@ fn a_users_model_gives_targets_their_class() {
     );
     assert!(
         !at.join("no_detector").exists(),
-        "nothing is begun with a model that is none"
+        "nothing is started with an invalid model"
     );
     let printed = ok(at, &with("red_things", "--instance-score 0.5"));
     for line in printed.stdout.lines() {

@@ -244,7 +244,7 @@ fn broken_files_are_reported_and_the_rest_is_shown() {
     assert_eq!(
         server.get("/api/runs/0/depth/000000").0,
         200,
-        "the sidecar alone is broken"
+        "only the sidecar is broken"
     );
     let index = server.json("/api/runs/0/index");
     assert_eq!(index["names"].as_array().unwrap().len(), 8, "{index}");
