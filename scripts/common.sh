@@ -1,10 +1,10 @@
 # shellcheck shell=bash
-# What the scripts of this folder share; sourced, not run.
+# Functions that the scripts of this folder share; sourced, not run.
 
 # The repository's root: every script runs from there.
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
-# Says what is wrong and what to do, and ends: fail MESSAGE [HINT].
+# Prints an error and a hint, and exits: fail MESSAGE [HINT].
 fail() {
     printf 'error: %s\n' "$1" >&2
     [ $# -lt 2 ] || printf 'hint: %s\n' "$2" >&2
@@ -13,17 +13,17 @@ fail() {
 
 step() { printf '== %s\n' "$*" >&2; }
 
-# The comment at the head of the calling script is its help.
+# Prints the comment at the head of the calling script as its help.
 usage() { sed -n '2,/^[^#]/{s/^# \{0,1\}//p;}' "$0"; }
 
-# An option's value: value OPTION "${2-}".
+# Prints an option's value: value OPTION "${2-}".
 value() {
-    [ -n "$2" ] || fail "$1 wants a value" "--help shows the options"
+    [ -n "$2" ] || fail "$1 needs a value" "--help shows the options"
     printf '%s\n' "$2"
 }
 
 need() {
-    command -v "$1" >/dev/null 2>&1 || fail "$1 is not there" "$2"
+    command -v "$1" >/dev/null 2>&1 || fail "$1 is not installed" "$2"
 }
 
 # The version that all crates share.

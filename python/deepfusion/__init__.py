@@ -140,7 +140,7 @@ def evaluate(
     columns = (predictions, ground_truth) if names is None else (predictions, ground_truth, names)
     for i, row in enumerate(zip_longest(*columns, fillvalue=_ENDED)):
         if any(value is _ENDED for value in row):
-            raise ValueError("predictions, ground_truth and names: one of them has " + (f"only {i}" if i else "none") + ", another more")
+            raise ValueError("predictions, ground_truth and names: one of them has " + (f"only {i}" if i else "none") + ", another has more")
         prediction, truth = row[:2]
         if truth is None:
             continue
@@ -158,7 +158,7 @@ def _plane(values: ArrayLike, what: str) -> NDArray[np.float64]:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 2:
         raise ValueError(f"{what}: expected H x W, found {' x '.join(map(str, array.shape)) or 'a number'}")
-    # A column of records is a view whose numbers do not lie one behind the other.
+    # A column of records is a view whose numbers are not contiguous.
     return np.require(array, np.float64, ["C", "ALIGNED"])
 
 

@@ -16,7 +16,7 @@ def own_gpu(device: str, workers: Workers | None) -> str:
     machine, among those that it sees."""
     if workers is not None and device == "auto":
         fastest = _native.fastest()
-        # Another backend's number is of a card, not of a process.
+        # Other backends number GPUs, not processes.
         device = "cuda" if fastest.partition(":")[0] == "cuda" else fastest
     if workers is None or device != "cuda":
         return device
@@ -25,7 +25,7 @@ def own_gpu(device: str, workers: Workers | None) -> str:
         return device
     seen = os.environ.get("CUDA_VISIBLE_DEVICES")
     index = int(said)
-    # A scheduler that shows each process its own GPU alone.
+    # Some schedulers show each process only its own GPU.
     if seen:
         index %= len(seen.split(","))
     return f"{device}:{index}"

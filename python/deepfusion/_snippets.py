@@ -38,7 +38,7 @@ class Snippets:
         self.offsets = tuple(offsets)
         self.depth_kind = depth_kind
         recording = self.recording
-        # By the frames' numbers: between two that are there others may be missing.
+        # By the frames' numbers, since frames between two existing ones may be missing.
         places = {frame.number: place for place, frame in enumerate(recording)}
 
         def sources_of(number: int, place: int) -> list[int] | None:

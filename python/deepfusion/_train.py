@@ -67,7 +67,7 @@ def _toml(value: Any) -> str:
         return "{" + ", ".join(f"{key} = {_toml(v)}" for key, v in value.items()) + "}"
     if isinstance(value, Sequence):
         return "[" + ", ".join(map(_toml, value)) + "]"
-    raise TypeError(f"config: {value!r} is nothing that a configuration can hold")
+    raise TypeError(f"config: a configuration cannot contain {value!r}")
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -139,9 +139,9 @@ def train(
         settings = list(_settings(table))
     if out is None:
         if workers is not None:
-            raise ValueError("workers: out is the run that all of them learn")
+            raise ValueError("workers: give out, the folder of the run that they all train")
         if resume:
-            raise ValueError("resume: out is the run that goes on")
+            raise ValueError("resume: give out, the folder of the run to continue")
         out = Path("runs") / time.strftime("train-%Y%m%d-%H%M%S", time.gmtime())
     out = Path(out)
     asked = {

@@ -67,11 +67,11 @@ class Torch:
         self._torch, self._distributed, self._group = torch, distributed, group
         self.rank: int = distributed.get_rank(group)
         self.count: int = distributed.get_world_size(group)
-        # Torch's current GPU is a thread's own, and `sum` is called on another one.
+        # Torch's current GPU is set per thread, and `sum` is called on another thread.
         self._gpu = torch.cuda.current_device() if distributed.get_backend(group) == "nccl" else None
 
     def sum(self, values: np.ndarray) -> None:
-        # By the buffer, not by NumPy: torch need not be built for the NumPy that is there.
+        # Through the buffer, not NumPy: torch may be built for another version of NumPy than the installed one.
         shared = self._torch.frombuffer(values, dtype=self._torch.float32)
         if self._gpu is not None:
             moved = shared.cuda(self._gpu)

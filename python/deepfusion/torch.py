@@ -31,7 +31,7 @@ class KittiLikeDataset(_TorchDataset):
 
     def __getitem__(self, index: int) -> dict[str, Any]:
         sample = self.snippets[index]
-        # Not copied until they become floats.
+        # Shared without a copy until they become floats.
         image, sources = (torch.from_dlpack(sample[key]) for key in ("image", "sources"))
         return {
             "image": image.permute(2, 0, 1).float().div_(255),

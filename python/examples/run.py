@@ -1,6 +1,6 @@
-"""Runs the notebook from top to bottom, in a folder of its own, and fails where a cell does.
+"""Runs the notebook from top to bottom in a temporary folder, and fails if a cell does.
 
-    python python/examples/run.py [OUT.ipynb]     needs nbclient, ipykernel, matplotlib; OUT gets it with its pictures
+    python python/examples/run.py [OUT.ipynb]     needs nbclient, ipykernel and matplotlib; writes the notebook with its pictures to OUT
 """
 
 import sys

@@ -17,7 +17,7 @@ use crate::error::{Failure, raise};
 use crate::interrupt::interruptible;
 use crate::train::{Listener, Warnings, warning_of};
 
-/// What was asked for, as `deepfusion/_adapt.py` arranges it.
+/// The arguments, as `deepfusion/_adapt.py` passes them.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct AdaptRequest {
@@ -36,7 +36,7 @@ struct AdaptRequest {
     speed_error: f64,
     seed: u64,
     device: String,
-    /// `key=value` over the configuration.
+    /// Changes of the configuration, as `key=value`.
     settings: Vec<String>,
 }
 
@@ -44,7 +44,7 @@ impl AdaptRequest {
     fn settings(&self, compute: Compute) -> Result<AdaptSettings, Failure> {
         let camera = self.camera.parse().map_err(|_| Failure {
             message: format!("camera: `{}`", self.camera),
-            hint: Some("\"2\", \"3\" or \"both\"".into()),
+            hint: Some("give \"2\", \"3\" or \"both\"".into()),
         })?;
         let own_camera = match self.simulated_camera.as_str() {
             "own" => true,
@@ -52,7 +52,7 @@ impl AdaptRequest {
             other => {
                 return Err(Failure {
                     message: format!("simulated_camera: `{other}`"),
-                    hint: Some("\"own\" or \"any\"".into()),
+                    hint: Some("give \"own\" or \"any\"".into()),
                 });
             }
         };
@@ -74,7 +74,7 @@ impl AdaptRequest {
     }
 }
 
-/// Learns on new drives, judges before and after, and keeps the result or lays it aside; the outcome as JSON.
+/// Trains on new drives, evaluates before and after, and keeps the result or moves it aside. Returns the outcome as JSON.
 #[pyfunction]
 pub(crate) fn adapt(
     py: Python<'_>,
@@ -105,7 +105,7 @@ pub(crate) fn adapt(
         let mut warnings = Warnings::default();
         if adaptation.may_have_seen_held_out() {
             warnings.others.push(
-                "the given network may have learned from the frames that are held out here: the figures before may be optimistic".into(),
+                "the given network may have been trained on the frames that are held out here: its metrics may be optimistic".into(),
             );
         }
         let mut of_start = Vec::new();
@@ -123,12 +123,12 @@ pub(crate) fn adapt(
         if summary.step < summary.steps {
             return Err(Failure {
                 message: format!(
-                    "stopped after {} of {} {}; what was learned is saved, and not judged",
+                    "stopped after {} of {} {}; the training is saved, but not evaluated",
                     summary.step,
                     summary.steps,
                     if summary.steps == 1 { "step" } else { "steps" }
                 ),
-                hint: Some("the same call goes on".into()),
+                hint: Some("continue with the same call".into()),
             });
         }
         let mut learned = loaded(&ModelSource::named(adaptation.work())?, None, place)?;
@@ -138,14 +138,14 @@ pub(crate) fn adapt(
             hint: None,
         })
     });
-    // What the listener raised is the reason; what was learned is saved.
+    // The listener's exception is the reason; the training is saved.
     if let Some(raised) = listener.raised {
         return Err(raised);
     }
     Ok(outcome??)
 }
 
-/// The network on this device, in f32.
+/// Loads the network on this device, in f32.
 fn loaded(
     network: &ModelSource,
     set: Option<&str>,
@@ -155,7 +155,7 @@ fn loaded(
     engine.load(network.load(set)?).map_err(device::failure)
 }
 
-/// Makes an adapted network predict as the one that it began from.
+/// Makes an adapted network predict as the one that it started from.
 #[pyfunction]
 pub(crate) fn undo_adaptation(out: PathBuf) -> PyResult<()> {
     undo(Path::new(&out)).map_err(raise)

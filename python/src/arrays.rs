@@ -1,4 +1,4 @@
-//! NumPy's arrays of what was computed.
+//! Results as NumPy arrays.
 
 use deepfusion::geometry::DepthMap;
 use numpy::ndarray::Array2;
@@ -10,7 +10,7 @@ use pyo3::sync::PyOnceLock;
 /// An array of H x W.
 pub(crate) type Plane = Py<PyArray2<f32>>;
 
-/// The array of a map, made when it is first asked for.
+/// The array of a map, made at the first call.
 pub(crate) fn once(
     py: Python<'_>,
     place: &PyOnceLock<Option<Plane>>,

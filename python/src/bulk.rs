@@ -1,4 +1,4 @@
-//! Many images: while the network looks at one, the next are read and the last is made depth.
+//! Many images: while the network works on one, the next are read and the previous one's depth is computed.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
@@ -20,7 +20,7 @@ use crate::error::{Failure, raise};
 use crate::image::Source;
 use crate::prediction::Prediction;
 
-/// What is asked of the network.
+/// The images and the settings of their prediction.
 pub(crate) struct BulkRequest {
     pub images: Py<PyIterator>,
     pub camera: AskedCamera,
@@ -28,15 +28,15 @@ pub(crate) struct BulkRequest {
     pub crop: bool,
     pub augmentation: Augmentation,
     pub factors: Arc<IntervalFactors>,
-    /// How many images may be on their way, where the caller says it.
+    /// How many images may be in progress, if the caller sets it.
     pub ahead: Option<usize>,
     pub assumed: Arc<AssumedCamera>,
 }
 
-/// Where an image's prediction is waited for.
+/// Sends an image's prediction to the iterator that waits for it.
 type Answer = Sender<Result<Prediction, Failure>>;
 
-/// An image that is read, on its way to the network.
+/// An image that has been read, on its way to the network.
 struct LoadedImage {
     image: RgbImage,
     camera: Option<Intrinsics>,
@@ -44,10 +44,10 @@ struct LoadedImage {
     answer: Answer,
 }
 
-/// What an image came to.
+/// The state of an image in the iterator.
 enum Waiting {
     For(Receiver<Result<Prediction, Failure>>),
-    /// It is none, or its iterator failed.
+    /// It is not an image, or its iterator raised.
     Wrong(PyErr),
 }
 
@@ -57,16 +57,17 @@ pub(crate) struct Predictions {
     request: BulkRequest,
     /// None once the images have ended.
     to_read: Option<Sender<(Source, Answer)>>,
-    /// In the images' order. Nobody waits for the lock: it makes what may be used by one thread a part of what Python may share.
+    /// In the images' order. The lock is never contended: it only makes receivers, which belong to one thread, part of an object that Python
+    /// may share.
     waiting: Mutex<VecDeque<Waiting>>,
-    /// How many images may be on their way.
+    /// How many images may be in progress.
     ahead: usize,
 }
 
 impl Predictions {
-    /// The threads end when this goes.
+    /// Starts the threads, which end when the iterator is dropped.
     pub(crate) fn begin(request: BulkRequest, estimator: DepthEstimator) -> PyResult<Self> {
-        // For as many cores as rayon takes: of a large machine a worker may be given one alone.
+        // For as many cores as rayon uses: a worker on a large machine may have only one.
         let readers =
             Threads::for_cores(deepfusion_cli::in_pool(rayon::current_num_threads)).before;
         let (to_read, images) = channel::<(Source, Answer)>();
@@ -85,7 +86,7 @@ impl Predictions {
             for (prediction, answer) in seen {
                 let prediction: Prediction = prediction;
                 let answer: Answer = answer;
-                // Nobody waits where the iterator is gone.
+                // Fails if the iterator was dropped.
                 drop(answer.send(Ok(prediction.with_depth())));
             }
         })?;
@@ -97,7 +98,7 @@ impl Predictions {
         })
     }
 
-    /// Sends images on their way.
+    /// Sends images to the readers until enough are in progress.
     fn fill(&mut self, py: Python<'_>) -> PyResult<()> {
         let waiting = self.waiting.get_mut();
         let waiting = waiting.unwrap_or_else(PoisonError::into_inner);
@@ -108,10 +109,10 @@ impl Predictions {
                 self.to_read = None;
                 break;
             };
-            // What is no image is raised at its turn: those before it are on their way.
+            // An object that is not an image raises at its turn: the images before it are still in progress.
             let source = match image.and_then(|image| Source::of(&image)) {
                 Ok(source) => source,
-                // Ctrl-C, or the interpreter's end, waits for nobody.
+                // KeyboardInterrupt and SystemExit are raised at once.
                 Err(error) if !error.is_instance_of::<PyException>(py) => return Err(error),
                 Err(error) => {
                     waiting.push_back(Waiting::Wrong(error));
@@ -120,7 +121,7 @@ impl Predictions {
             };
             let (answer, prediction) = channel();
             if to_read.send((source, answer)).is_err() {
-                return Err(PyRuntimeError::new_err("the threads that read have ended"));
+                return Err(PyRuntimeError::new_err("the reading threads have ended"));
             }
             waiting.push_back(Waiting::For(prediction));
         }
@@ -138,7 +139,7 @@ impl Predictions {
         let next = slf.try_borrow_mut();
         let mut next = next.map_err(|_| {
             PyRuntimeError::new_err(
-                "predictions: another thread waits for the next one; give each thread an iterator of its own, of model.another()",
+                "predictions: another thread waits for the next one; give each thread its own iterator, from model.another()",
             )
         })?;
         next.advance(slf.py())
@@ -167,9 +168,7 @@ impl Predictions {
                 }
                 Ok(Some(prediction))
             }
-            Err(_) => Err(PyRuntimeError::new_err(
-                "the thread of the network has ended",
-            )),
+            Err(_) => Err(PyRuntimeError::new_err("the network's thread has ended")),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Cameras as Python gives them.
+//! Cameras given in Python.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -47,7 +47,7 @@ impl GivenCamera {
                 if rows.iter().any(|row| row[3] != 0.0) {
                     return Err(Failure {
                         message: "intrinsics: this 3 x 4 matrix moves the camera: its last column is not 0".into(),
-                        hint: Some("P[:, :3] is the camera's own matrix".into()),
+                        hint: Some("give P[:, :3], the camera's own matrix".into()),
                     });
                 }
                 rows.map(|[a, b, c, _]| [a, b, c])
@@ -61,7 +61,7 @@ impl GivenCamera {
             }
             rows => Err(Failure {
                 message: format!("intrinsics: {rows:?} is not the matrix of a pinhole camera"),
-                hint: Some("fx 0 cx, 0 fy cy, 0 0 1".into()),
+                hint: Some("give rows fx 0 cx, 0 fy cy, 0 0 1".into()),
             }),
         }
     }
@@ -71,26 +71,28 @@ pub(crate) fn numbers_of(camera: Option<GivenCamera>) -> Result<Option<[f64; 4]>
     camera.map(GivenCamera::numbers).transpose()
 }
 
-/// A camera that can be one, of an image of this size.
+/// Checks a camera's numbers and makes the camera of an image of this size.
 pub(crate) fn checked([fx, fy, cx, cy]: [f64; 4], size: (u32, u32)) -> Result<Intrinsics, Failure> {
     let finite = [fx, fy, cx, cy].iter().all(|v| v.is_finite());
     if !(finite && fx > 0.0 && fy > 0.0) {
         return Err(Failure {
             message: format!("intrinsics: {:?} is no camera", (fx, fy, cx, cy)),
-            hint: Some("fx, fy, cx, cy in pixels of this image; fx and fy above 0".into()),
+            hint: Some(
+                "give fx, fy, cx, cy in pixels of this image, with fx and fy above 0".into(),
+            ),
         });
     }
     Ok(Intrinsics::from_numbers([fx, fy, cx, cy], size))
 }
 
-/// What the caller says of the camera of images.
+/// The camera of the images as given by the caller.
 #[derive(Clone, Copy)]
 pub(crate) enum AskedCamera {
-    /// Nothing: each image may say it.
+    /// Not given: the image's own camera is used, if known.
     Unsaid,
     /// fx, fy, cx, cy.
     Numbers([f64; 4]),
-    /// The view from left to right, degrees.
+    /// The horizontal field of view in degrees.
     View(f64),
 }
 
@@ -107,12 +109,12 @@ impl AskedCamera {
                 HFOV_DEG.0, HFOV_DEG.1
             ))),
             (Some(_), Some(_)) => Err(PyValueError::new_err(
-                "intrinsics and hfov_deg both say the camera: give one of them",
+                "intrinsics and hfov_deg both describe the camera: give only one of them",
             )),
         }
     }
 
-    /// Of an image of this size.
+    /// The given camera for an image of this size.
     pub(crate) fn of(self, size: (u32, u32)) -> Result<Option<Intrinsics>, Failure> {
         match self {
             Self::Unsaid => Ok(None),
@@ -122,20 +124,20 @@ impl AskedCamera {
     }
 }
 
-/// Whether Python was warned that the camera of an image is not known.
+/// Whether Python was warned that an image's camera is unknown.
 #[derive(Default)]
 pub(crate) struct AssumedCamera(AtomicBool);
 
 impl AssumedCamera {
-    /// Once for all images of a network.
+    /// Warns once for all images of a network.
     pub(crate) fn warn(&self, py: Python<'_>) -> PyResult<()> {
         if self.0.swap(true, Ordering::Relaxed) {
             return Ok(());
         }
         warn(
             py,
-            "nothing says the camera of an image: the lens of the training camera is assumed, and the metres are as right as that; \
-             give intrinsics, or hfov_deg",
+            "an image's camera is unknown: assuming the training camera's lens, so depth in metres is only as accurate as that; \
+             give intrinsics or hfov_deg",
         )
     }
 }

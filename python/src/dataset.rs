@@ -22,20 +22,20 @@ use crate::error::{Failure, raise, warn, with_hint};
 use crate::interrupt::abandonable;
 use crate::opening::{Opening, absolute};
 
-/// What pickle calls, and with what.
+/// What pickle calls to restore an object, and the arguments.
 type Reduced<'py, A> = (Bound<'py, PyAny>, A);
 
 /// A recording of any known layout: one drive, one camera. `recording[i]` reads nothing but what is known about the frame.
 #[pyclass(frozen, module = "deepfusion")]
 pub(crate) struct Dataset {
     inner: Arc<data::Dataset>,
-    /// Absolute, with what else opens it again in another process.
+    /// Absolute; with `drive` and `opening`, it opens the recording again in another process.
     path: PathBuf,
     drive: usize,
     opening: Opening,
-    /// That of its files, absolute.
+    /// Folder of its files, absolute.
     folder: PathBuf,
-    /// What may not be meant of it.
+    /// Warnings about the recording.
     warnings: Vec<String>,
 }
 
@@ -61,10 +61,10 @@ pub(crate) fn drives(
     all.map(one).collect()
 }
 
-/// Opens what is below a path, and warns of frames that a split names and nobody has.
+/// Opens the recordings below a path, and warns of a split's frames that do not exist.
 fn opened(py: Python<'_>, path: &Path, opening: &Opening) -> PyResult<Vec<data::Dataset>> {
     let (path, opening) = (path.to_owned(), opening.clone());
-    // A large recording takes long to look through.
+    // Opening a large recording takes long.
     let open = move || -> Result<_, Failure> {
         let options = opening.options()?;
         let all = data::Dataset::open(&path, &options)?;
@@ -79,7 +79,7 @@ fn opened(py: Python<'_>, path: &Path, opening: &Opening) -> PyResult<Vec<data::
 }
 
 impl Dataset {
-    /// The drive of this number below a path, and its warnings, of which Python is told.
+    /// Wraps the drive with this number below a path, and issues its warnings in Python.
     fn of(
         py: Python<'_>,
         inner: data::Dataset,
@@ -100,7 +100,7 @@ impl Dataset {
         })
     }
 
-    /// The place of a frame by its index, from the end where that is below 0.
+    /// The position of a frame by its index, which counts from the end if negative.
     fn place(&self, index: isize) -> PyResult<usize> {
         let count = self.__len__();
         let place = match index {
@@ -117,7 +117,7 @@ impl Dataset {
         self.inner.selected().iter().map(|index| &frames[*index])
     }
 
-    /// A number of each frame, NaN where it is not known.
+    /// A number of each frame, NaN if unknown.
     fn column<'py>(
         &self,
         py: Python<'py>,
@@ -150,7 +150,7 @@ impl Dataset {
         let mut all = opened(py, &path, &opening)?;
         if drive >= all.len() {
             let message = format!("{}: drive {drive} of {}", path.display(), all.len());
-            let hint = "drives are counted from 0; drives(path) opens all of them; or give the folder of one drive".to_owned();
+            let hint = "count drives from 0, give the folder of one drive, or open all of them with drives(path)".to_owned();
             return Err(with_hint(message, Some(hint)));
         }
         Self::of(py, all.swap_remove(drive), (path.as_path(), drive), opening)
@@ -175,7 +175,7 @@ impl Dataset {
         };
         let count = isize::try_from(dataset.__len__())?;
         let part = slice.indices(count)?;
-        // A slice's places are those of frames.
+        // A slice within the sequence has valid positions only.
         let places = (0..part.slicelength).map(|n| {
             part.start
                 .unsigned_abs()
@@ -307,9 +307,9 @@ impl Frames {
 /// One frame of a recording.
 #[pyclass(frozen, module = "deepfusion")]
 pub(crate) struct Frame {
-    /// The object of Python, so that frames that are pickled together are of one recording.
+    /// The Python object, so that frames that are pickled together share one recording.
     dataset: Py<Dataset>,
-    /// Among those that are selected.
+    /// Position among the selected frames.
     place: usize,
 }
 
@@ -318,7 +318,7 @@ impl Frame {
         &self.dataset.get().inner
     }
 
-    /// Among all frames.
+    /// Index among all frames.
     fn index(&self) -> usize {
         self.data().selected()[self.place]
     }
@@ -327,7 +327,7 @@ impl Frame {
         &self.data().frames()[self.index()]
     }
 
-    /// The recording and the place in it, for another thread.
+    /// The recording and the frame's index in it, for another thread.
     pub(crate) fn source(&self) -> (Arc<data::Dataset>, usize) {
         (Arc::clone(&self.dataset.get().inner), self.index())
     }

@@ -16,16 +16,16 @@ pub(crate) fn built() -> Vec<&'static str> {
     built.map(Backend::name).collect()
 }
 
-/// The device that "auto" is here, by its word.
+/// The name of the device that "auto" chooses here.
 #[pyfunction]
 pub(crate) fn fastest() -> String {
     devices::fastest().to_string()
 }
 
-/// Raises where a word is no device of this package; whether the machine has it is not asked.
+/// Raises if a name is not a device of this package. Does not check whether the machine has the device.
 #[pyfunction]
 pub(crate) fn check_device(device: &str) -> PyResult<()> {
-    // Which one that is, whoever computes finds out.
+    // The device is chosen where the work runs.
     if device == "auto" {
         return Ok(());
     }
@@ -37,7 +37,7 @@ pub(crate) fn check_device(device: &str) -> PyResult<()> {
     Err(failure(Error::NoBackend { device }).into())
 }
 
-/// The device that a word means.
+/// Parses a device's name.
 pub(crate) fn named(word: &str) -> Result<ComputeDevice, Failure> {
     ComputeDevice::chosen(word).map_err(|why| Failure {
         message: format!("device: {word:?}: {why}"),
@@ -45,25 +45,25 @@ pub(crate) fn named(word: &str) -> Result<ComputeDevice, Failure> {
     })
 }
 
-/// Opens it.
+/// Opens a device.
 pub(crate) fn open(device: ComputeDevice) -> Result<Device, Failure> {
     devices::open(device).map_err(failure)
 }
 
-/// An error of the library, with what helps in Python.
+/// An error of the library, with a hint for Python.
 pub(crate) fn failure(error: Error) -> Failure {
     let hint = match &error {
         Error::NoBackend { device } => Some(format!(
-            "build the package with it, in a checkout: pip install ./python --config-settings=build-args=\"--features {device}\"; or device=\"cpu\""
+            "build the package with it, in a checkout: pip install ./python --config-settings=build-args=\"--features {device}\"; or use device=\"cpu\""
         )),
         Error::NoSuchDevice {
             backend,
             count: 1..,
             ..
         } => Some(format!(
-            "they are counted from 0; device=\"{backend}\" is the one that the backend prefers"
+            "devices are counted from 0; device=\"{backend}\" uses the one that the backend prefers"
         )),
-        Error::OnlyFused { .. } => Some("precision=\"f32\", or device=\"cpu\"".into()),
+        Error::OnlyFused { .. } => Some("use precision=\"f32\" or device=\"cpu\"".into()),
         other => other.hint(),
     };
     Failure {

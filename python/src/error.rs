@@ -1,4 +1,4 @@
-//! Errors of the library as Python's.
+//! The library's errors as Python exceptions.
 
 use std::ffi::CString;
 
@@ -13,12 +13,12 @@ pyo3::create_exception!(
     "What went wrong, with the file, frame or field; `hint` says what to do about it."
 );
 
-/// Gives the class a `hint` of None, for exceptions that nobody gives one.
+/// Gives the class a `hint` of None, for exceptions without one.
 pub(crate) fn set_default_hint(py: Python<'_>) -> PyResult<()> {
     py.get_type::<DeepFusionError>().setattr("hint", py.None())
 }
 
-/// What went wrong and what to do about it, before the interpreter is at hand.
+/// An error's message and hint, where the interpreter is not attached.
 pub(crate) struct Failure {
     pub message: String,
     pub hint: Option<String>,
@@ -44,7 +44,7 @@ pub(crate) fn raise(error: impl Hint) -> PyErr {
     with_hint(error.to_string(), error.hint())
 }
 
-/// As one of Python's own warnings; where those are errors, it is raised.
+/// Issues a Python warning; returns the exception if warnings are errors.
 pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
     let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
@@ -55,7 +55,7 @@ pub(crate) fn with_hint(message: String, hint: Option<String>) -> PyErr {
     let error = DeepFusionError::new_err(message);
     Python::attach(|py| {
         let value = error.value(py);
-        // The message stands without them.
+        // If these fail, the message still remains.
         let _ = value.setattr("hint", hint.clone());
         if let Some(hint) = hint {
             let _ = value.call_method1("add_note", (format!("hint: {hint}"),));

@@ -1,4 +1,4 @@
-//! Images as Python gives them: an array, a picture of PIL's, a file, or a frame of a recording.
+//! Images given in Python: an array, a PIL image, a file, or a frame of a recording.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,13 +15,13 @@ use crate::camera::AskedCamera;
 use crate::dataset::Frame;
 use crate::error::Failure;
 
-/// Where an image is.
+/// Source of an image.
 pub(crate) enum Source {
-    /// Here, and the camera that the file says which they were read from.
+    /// Pixels in memory, and the camera from the EXIF data of the file that they were read from.
     Pixels(RgbImage, Option<Intrinsics>),
-    /// In a file.
+    /// A file.
     File(PathBuf),
-    /// In a recording, which knows its camera.
+    /// A frame of a recording, which has a camera.
     Frame(Arc<Dataset>, usize),
 }
 
@@ -43,7 +43,7 @@ impl Source {
         let array = if image.hasattr("__dlpack__")? {
             numpy.call_method1("from_dlpack", (image,))?
         } else if image.hasattr("convert")? {
-            // PIL's way, which others have as well.
+            // PIL's interface, which other libraries also have.
             exif = exif_of_file(image)?;
             of_pil(&upright(image)?)?
         } else {
@@ -59,7 +59,7 @@ impl Source {
         }
     }
 
-    /// The pixels, and the camera: the one asked for, else the recording's, or what EXIF says of the lens.
+    /// The pixels, and the camera: the one asked for, else the recording's or the one from EXIF.
     pub(crate) fn read(
         self,
         asked: AskedCamera,
@@ -80,17 +80,17 @@ impl Source {
     }
 }
 
-/// What an array is that is no image, and what makes it one.
+/// The error for an array that is not an image, with how to convert it.
 fn no_image(array: &Bound<'_, PyAny>) -> PyResult<PyErr> {
     let kind = array.getattr("dtype")?.str()?.to_string();
     let shape: Vec<usize> = array.getattr("shape")?.extract()?;
     let hint = match shape.as_slice() {
         [_, _, 3] if kind.starts_with("float") => {
-            ": where it is from 0 to 1, (image * 255).astype(\"uint8\")"
+            ": if it is from 0 to 1, give (image * 255).astype(\"uint8\")"
         }
-        [_, _] => ": of grey, np.stack([image] * 3, -1), of uint8",
-        [_, _, _, 3] => ": predict_many takes several images",
-        [3, _, _] => ": image.transpose(1, 2, 0), of uint8",
+        [_, _] => ": for grey, give np.stack([image] * 3, -1) of uint8",
+        [_, _, _, 3] => ": give several images to predict_many",
+        [3, _, _] => ": give image.transpose(1, 2, 0) of uint8",
         _ => "",
     };
     Ok(PyTypeError::new_err(format!(
@@ -107,7 +107,7 @@ fn sizes(shape: &[usize]) -> String {
     sizes.join(" x ")
 }
 
-/// The EXIF block of an image that PIL opened and nobody changed: of one that was cut, the focal length is no longer true.
+/// The EXIF block of an image that PIL opened and that was not changed: after cropping, the focal length would be wrong.
 fn exif_of_file(image: &Bound<'_, PyAny>) -> PyResult<Option<Vec<u8>>> {
     let Ok(pil) = image.py().import("PIL.ImageFile") else {
         return Ok(None);
@@ -115,13 +115,13 @@ fn exif_of_file(image: &Bound<'_, PyAny>) -> PyResult<Option<Vec<u8>>> {
     if !image.is_instance(&pil.getattr("ImageFile")?)? {
         return Ok(None);
     }
-    // A PNG may have it behind its pixels.
+    // A PNG may have EXIF data after its pixels.
     image.call_method0("load")?;
     let block = image.getattr("info")?.call_method1("get", ("exif",))?;
     Ok(block.extract().ok())
 }
 
-/// A PIL image of a file whose EXIF says how the camera was held, turned as a file's own pixels are.
+/// A PIL image rotated according to its EXIF data, as images are when the library reads a file.
 fn upright<'py>(image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let py = image.py();
     if !image.hasattr("getexif")? {
@@ -131,11 +131,11 @@ fn upright<'py>(image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         .call_method1("exif_transpose", (image,))
 }
 
-/// The pixels of a PIL image, H x W x 3. Its own conversion cuts 16-bit grey off at 255: here it becomes 8 bits as that of a file does.
+/// The pixels of a PIL image, H x W x 3. PIL's own conversion clips 16-bit grey at 255; here it is scaled to 8 bits, as when reading a file.
 fn of_pil<'py>(image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let py = image.py();
     let numpy = py.import("numpy")?;
-    // What only looks like PIL's need not have one.
+    // Objects that only have PIL's interface may lack a mode.
     let mode = image.getattr("mode").ok();
     let mode: Option<String> = mode.and_then(|mode| mode.extract().ok());
     match mode.as_deref() {
@@ -150,7 +150,7 @@ fn of_pil<'py>(image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
             Ok(rgb.into_pyarray(py).into_any())
         }
         Some(mode @ ("I" | "F")) => Err(PyTypeError::new_err(format!(
-            "image: a PIL image of mode {mode:?} has no fixed range: give one of 8 bits, or an array of uint8"
+            "image: a PIL image of mode {mode:?} has no fixed range: give one of 8 bits or an array of uint8"
         ))),
         _ => {
             let rgb = image.call_method1("convert", ("RGB",))?;
@@ -164,9 +164,9 @@ fn of_array(array: &PyReadonlyArray3<'_, u8>) -> PyResult<RgbImage> {
     let size = u32::try_from(width).ok().zip(u32::try_from(height).ok());
     let (Some((w, h)), 3, true) = (size, channels, width > 0 && height > 0) else {
         let hint = match (height, channels) {
-            (_, 4) => ": image[..., :3] leaves the fourth channel out",
-            (_, 1) => ": np.concatenate([image] * 3, -1) makes grey three channels",
-            (3, _) => ": image.transpose(1, 2, 0)",
+            (_, 4) => ": give image[..., :3], without the fourth channel",
+            (_, 1) => ": give np.concatenate([image] * 3, -1), grey in three channels",
+            (3, _) => ": give image.transpose(1, 2, 0)",
             _ => "",
         };
         let message = format!(
@@ -176,9 +176,9 @@ fn of_array(array: &PyReadonlyArray3<'_, u8>) -> PyResult<RgbImage> {
     };
     let bytes: Vec<u8> = match array.as_slice() {
         Ok(bytes) if array.is_c_contiguous() => bytes.to_vec(),
-        // Rows or channels in another order, a part of a larger array.
+        // Rows or channels in another order, or a part of a larger array.
         _ => array.as_array().iter().copied().collect(),
     };
     RgbImage::from_raw(w, h, bytes)
-        .ok_or_else(|| PyValueError::new_err("image: its size is not that of its bytes"))
+        .ok_or_else(|| PyValueError::new_err("image: its size does not match its bytes"))
 }

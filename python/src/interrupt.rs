@@ -1,4 +1,4 @@
-//! Ctrl-C in long calls: Python's handler runs on its main thread alone, and only when that asks for it.
+//! Ctrl-C in long calls: Python's handler runs only on its main thread, and only when that thread checks for signals.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,14 +9,14 @@ use std::time::Duration;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-/// How often is asked.
+/// Time between two checks for signals.
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// Whether the work should end, asked by the work where nothing is lost.
+/// Whether the work should stop; the work checks it where nothing is lost.
 #[derive(Default)]
 pub(crate) struct Stop(AtomicBool);
 
-/// What unwinds out of work that has a listener and no way to be stopped.
+/// Payload that unwinds out of work that has a listener but cannot be stopped otherwise.
 struct Stopped;
 
 impl Stop {
@@ -24,7 +24,7 @@ impl Stop {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// The answer of a listener that is asked whether to go on.
+    /// The return value of a listener that says whether to continue.
     pub(crate) fn flow(&self) -> ControlFlow<()> {
         if self.asked() {
             ControlFlow::Break(())
@@ -33,7 +33,7 @@ impl Stop {
         }
     }
 
-    /// For a listener: unwinds to [`interruptible`] where the work should end. No panic: nothing is printed.
+    /// For a listener: unwinds to [`interruptible`] if the work should stop. This is not a panic, so nothing is printed.
     pub(crate) fn unwind_if_asked(&self) {
         if self.asked() {
             std::panic::resume_unwind(Box::new(Stopped));
@@ -41,10 +41,11 @@ impl Stop {
     }
 }
 
-/// Does `work` without the interpreter on a thread of a pool of its own, while this thread asks for signals. In the pool that predictions
-/// share one of them, waiting for its parts, could take up a whole training meanwhile, and a listener that predicts would wait for a thread
-/// that its own training holds. After Ctrl-C `work` is asked to
-/// stop, is waited for, and KeyboardInterrupt raised.
+/// Does `work` without the interpreter in its own pool of threads, while this thread checks for signals. After Ctrl-C, `work` is asked to
+/// stop and waited for, and KeyboardInterrupt is raised.
+///
+/// The pool that predictions share would not do: there, a prediction that waits for its parts could start a whole training, and a listener
+/// that predicts would wait for a thread that its own training holds.
 pub(crate) fn interruptible<R: Send>(
     py: Python<'_>,
     work: impl FnOnce(&Stop) -> R + Send,
@@ -54,7 +55,7 @@ pub(crate) fn interruptible<R: Send>(
     let (result, interrupted) = py.detach(move || {
         thread::scope(|scope| {
             let worker = thread::Builder::new().spawn_scoped(scope, move || {
-                // Dropped at the end, however that comes.
+                // Dropped when the work ends, even by unwinding.
                 let _done = done;
                 deepfusion_cli::in_own_pool(|| work(stop))
             })?;
@@ -75,18 +76,18 @@ pub(crate) fn interruptible<R: Send>(
     }
 }
 
-/// Does `work` that only reads and cannot be stopped: after Ctrl-C it is left alone, to end by itself.
+/// Does `work` that only reads and cannot be stopped: after Ctrl-C it is left to end by itself.
 pub(crate) fn abandonable<R: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> R + Send + 'static,
 ) -> PyResult<R> {
     let (send, mut result) = mpsc::channel();
     let worker = thread::Builder::new().spawn(move || {
-        // Fails where nobody waits any more.
+        // Fails after Ctrl-C, when the receiver is gone.
         drop(send.send(deepfusion_cli::in_this_process(work)));
     })?;
     loop {
-        // The receiver is not shared between threads: it goes there and comes back.
+        // A receiver cannot be shared between threads, so it is moved into the closure and returned.
         let (got, back) = py.detach(move || (result.recv_timeout(PERIOD), result));
         result = back;
         match got {

@@ -48,7 +48,7 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        // NumPy's functions are looked up once, at the first array: here, where Ctrl-C cannot come between.
+        // NumPy's functions are looked up once, at the first array. Doing that here keeps Ctrl-C from interrupting it.
         drop(numpy::PyArray1::<f32>::zeros(module.py(), 0, false));
         deepfusion_cli::loaded_here();
         super::error::set_default_hint(module.py())?;

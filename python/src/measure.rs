@@ -1,4 +1,4 @@
-//! Evaluation, simulated drives, and what is wrong with a recording.
+//! Evaluation, simulated drives and the doctor.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -124,7 +124,7 @@ impl Evaluation {
 }
 
 impl Evaluation {
-    /// What is compared of a network's prediction: its arrays as they stand there.
+    /// The values of a network's prediction that are compared: its arrays in their current state.
     fn seen(&self, py: Python<'_>, name: &str, seen: &Prediction) -> PyResult<Grid> {
         if !self.of_disparity {
             return grid(&seen.depth(py)?.bind(py).try_readonly()?);
@@ -132,21 +132,21 @@ impl Evaluation {
         if !seen.saw_all() {
             return Err(with_hint(
                 format!(
-                    "prediction `{name}` is of a part of its image, and its disparity is of that part alone"
+                    "prediction `{name}` covers only a part of its image, and so does its disparity"
                 ),
-                Some("predict(image, stretch=True) looks at the whole image; or kind=\"depth\", allow_holes=True".into()),
+                Some("predict the whole image with stretch=True, or evaluate with kind=\"depth\", allow_holes=True".into()),
             ));
         }
         grid(&seen.disparity(py)?.bind(py).try_readonly()?)
     }
 }
 
-/// An error of the evaluation, with what helps in Python.
+/// An error of the evaluation, with a hint for Python.
 fn refused(error: Error) -> PyErr {
     let hint = match &error {
         Error::InvalidPrediction { kind, .. } => Some(format!(
-            "a network's {kind} is above 0 wherever it looked; where these values mean \"no prediction\", allow_holes=True leaves them \
-             out and counts them as missing_rate; predict(image, stretch=True) looks at the whole image"
+            "a network's {kind} is positive everywhere; if these values mean \"no prediction\", give allow_holes=True, which leaves them out and \
+             counts them in missing_rate, or predict the whole image with predict(image, stretch=True)"
         )),
         other => other.hint(),
     };
@@ -163,7 +163,7 @@ fn grid<T: numpy::Element + Copy + Into<f64>>(array: &PyReadonlyArray2<'_, T>) -
     Grid::new(width, height, values.collect()).map_err(raise)
 }
 
-/// Writes a simulated drive; gives its folder.
+/// Writes a simulated drive and returns its folder.
 #[expect(clippy::too_many_arguments, reason = "by name in Python")]
 #[pyfunction]
 pub(crate) fn simulate(
@@ -183,9 +183,9 @@ pub(crate) fn simulate(
     let scene = scene.ok_or_else(|| {
         let names = Scene::ALL.map(Scene::name).join(", ");
         with_hint(
-            "scene: there is none of this name".into(),
+            "scene: no scene of this name".into(),
             Some(format!(
-                "one of {names}; with varied=True motorway or country, too"
+                "give one of {names}, or, with varied=True, motorway or country"
             )),
         )
     })?;
@@ -232,7 +232,7 @@ fn diagnosis(path: &Path, opening: &Opening) -> Result<Diagnosis, Failure> {
                     "{}: a log of speeds by itself has no camera, topics or clock to compare with",
                     path.display()
                 ),
-                hint: Some("doctor(path) looks at a log".into()),
+                hint: Some("call doctor(path) without further arguments".into()),
             });
         }
         let found = doctor_log(path, &ReadOptions::default());

@@ -62,15 +62,15 @@ pub(crate) fn load(
         };
         let estimator = engine.load(network).map_err(device::failure)?;
         let factors = Arc::new(source.interval_factors()?);
-        // What cannot be read is an error of whoever needs it.
+        // An unreadable calibration is an error only for code that needs it.
         let stale = source.stale_calibrations().unwrap_or_default();
         if source.folder().is_some() || model.is_file() {
-            // No embedded network's name: found from any folder.
+            // Not an embedded network's name: absolute, so that it is found from any folder.
             loaded.model = absolute(model);
         }
         Ok((Model::new(estimator, place, factors, loaded), stale))
     };
-    // Large weights are read, and packed or moved to a GPU: that can take a while.
+    // Reading large weights and packing them or moving them to a GPU can take a while.
     let (model, stale) = abandonable(py, open)??;
     for stale in stale {
         warn(py, &stale.to_string())?;
@@ -83,13 +83,13 @@ pub(crate) fn load(
 pub(crate) struct Model {
     estimator: Mutex<DepthEstimator>,
     device: ComputeDevice,
-    /// By which what it says of its own error is stretched.
+    /// Factors that calibrate the predicted sigma.
     factors: Arc<IntervalFactors>,
     assumed: Arc<AssumedCamera>,
     loaded: LoadArguments,
 }
 
-/// What loads a network again, in another process as well.
+/// The arguments that load the network again, also in another process.
 #[derive(Clone)]
 struct LoadArguments {
     model: PathBuf,
@@ -114,7 +114,7 @@ impl Model {
         }
     }
 
-    /// Whatever thread held it before: an estimator keeps nothing from image to image.
+    /// Uses the estimator, even after a panic in another thread: it keeps no state from image to image.
     fn with<R>(&self, work: impl FnOnce(&mut DepthEstimator) -> R) -> R {
         work(
             &mut self
@@ -154,8 +154,8 @@ impl Model {
         let source = Source::of(image)?;
         let work = || -> Result<_, Failure> {
             let (image, camera) = source.read(asked)?;
-            // Inside the pool, so that its many small parallel parts begin at once. The lock is taken outside: a thread of the pool that
-            // waits for its parts takes up other work meanwhile, and another prediction would then wait for the lock below it, for ever.
+            // Inside the pool, so that its many small parallel parts start at once. The lock is taken outside: a thread of the pool that
+            // waits for its parts takes up other work meanwhile, and if that were another prediction, it would wait for the lock forever.
             let prediction = self.with(|estimator| {
                 deepfusion_cli::in_pool(|| {
                     let preparer = estimator.augmented(augmentation)?;
@@ -166,7 +166,7 @@ impl Model {
             })?;
             Ok((prediction, image, camera))
         };
-        // The lock is taken without the interpreter's: another thread that holds it may be waiting for that.
+        // The lock is taken without the GIL: the thread that holds it may be waiting for the GIL.
         let (prediction, image, camera) = py.detach(work)?;
         if camera.is_none() {
             self.assumed.warn(py)?;
@@ -264,10 +264,10 @@ impl Model {
     }
 }
 
-/// What loads a model, and its arguments.
+/// The function that loads a model, and its arguments.
 type Reduced<'py> = (Bound<'py, PyAny>, (PathBuf, String, Option<String>, String));
 
-/// The predictions of each image by the name that the command line has for them.
+/// Test-time augmentation by its name on the command line.
 fn augmentation_named(name: Option<&str>) -> PyResult<Augmentation> {
     let Some(name) = name else {
         return Ok(Augmentation::NONE);

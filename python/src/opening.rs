@@ -1,4 +1,4 @@
-//! How a recording is opened: what `Dataset`, `drives` and `doctor` have in common.
+//! Options for opening a recording that `Dataset`, `drives` and `doctor` have in common.
 
 use std::path::PathBuf;
 
@@ -11,13 +11,13 @@ use pyo3::types::{PyDict, PyMapping};
 use crate::camera::{GivenCamera, numbers_of};
 use crate::error::Failure;
 
-/// What Python says of a recording, in place of what it says itself.
+/// Options that replace what the recording itself contains.
 #[derive(Clone, Default)]
 pub(crate) struct Opening {
     camera: Cameras,
     intrinsics: Option<[f64; 4]>,
     hfov_deg: Option<f64>,
-    /// Absolute, as the other file: an opening may be sent to another process.
+    /// Absolute, like `split`, since the options may be sent to another process.
     calibration: Option<PathBuf>,
     topics: Vec<NamedTopic>,
     clock_offset_ms: Option<f64>,
@@ -25,7 +25,7 @@ pub(crate) struct Opening {
 }
 
 impl Opening {
-    /// The topics that are named.
+    /// The named topics.
     pub(crate) fn topics(&self) -> &[NamedTopic] {
         &self.topics
     }
@@ -38,7 +38,7 @@ impl Opening {
     ) -> PyResult<Self> {
         let intrinsics = numbers_of(intrinsics)?;
         if intrinsics.is_some() && hfov_deg.is_some() {
-            let message = "intrinsics and hfov_deg both say the camera: give one of them";
+            let message = "intrinsics and hfov_deg both describe the camera: give only one of them";
             return Err(PyValueError::new_err(message));
         }
         Ok(Self {
@@ -50,7 +50,7 @@ impl Opening {
         })
     }
 
-    /// With one camera of two, a calibration file and a split.
+    /// Adds one of two cameras, a calibration file and a split.
     pub(crate) fn of_dataset(
         self,
         camera: &str,
@@ -69,7 +69,7 @@ impl Opening {
         })
     }
 
-    /// As the library has it.
+    /// As the library's options.
     pub(crate) fn options(&self) -> Result<OpenOptions, Failure> {
         Ok(OpenOptions {
             camera: self.camera,
@@ -83,14 +83,14 @@ impl Opening {
         })
     }
 
-    /// Whether anything is said but which camera and which frames.
+    /// Whether anything but the camera's number and the frames is set.
     pub(crate) fn says_something(&self) -> bool {
         let camera = self.intrinsics.is_some() || self.hfov_deg.is_some();
         let camera = camera || self.calibration.is_some();
         camera || !self.topics.is_empty() || self.clock_offset_ms.is_some()
     }
 
-    /// The arguments by name that say it again.
+    /// The keyword arguments that give the same options.
     pub(crate) fn arguments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let named = PyDict::new(py);
         named.set_item("camera", camera_word(self.camera))?;
@@ -108,7 +108,7 @@ impl Opening {
     }
 }
 
-/// Of a mapping from roles to topics.
+/// Parses a mapping from roles to topics.
 fn named_topics(topics: &Bound<'_, PyAny>) -> PyResult<Vec<NamedTopic>> {
     let wrong = |_: PyErr| {
         PyTypeError::new_err(
@@ -124,7 +124,7 @@ fn named_topics(topics: &Bound<'_, PyAny>) -> PyResult<Vec<NamedTopic>> {
     pairs.into_iter().map(named).collect()
 }
 
-/// The same path from wherever it is looked at.
+/// The absolute path, which is the same from any folder.
 pub(crate) fn absolute(path: PathBuf) -> PathBuf {
     std::path::absolute(&path).unwrap_or(path)
 }

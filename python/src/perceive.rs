@@ -15,13 +15,13 @@ use std::sync::{Mutex, PoisonError};
 use crate::camera::{GivenCamera, checked};
 use crate::error::{raise, with_hint};
 
-/// Follows targets from image to image.
+/// Tracks targets from image to image.
 #[pyclass(frozen, module = "deepfusion._native")]
 pub(crate) struct Perception {
     inner: Mutex<Perceiver>,
 }
 
-/// What was found, for Python's dataclasses.
+/// The detections as JSON, for Python's dataclasses.
 #[derive(Serialize)]
 struct Detections<'a> {
     targets: Vec<DetectedTarget<'a>>,
@@ -44,7 +44,7 @@ struct Ground {
 
 #[pymethods]
 impl Perception {
-    /// `settings`: a JSON object over those for predicted depth, or for `exact` depth.
+    /// `settings`: a JSON object with changes to the defaults for predicted depth, or for `exact` depth.
     #[new]
     fn new(settings: &str, exact: bool) -> PyResult<Self> {
         let base = if exact {
@@ -95,7 +95,8 @@ impl Perception {
             }),
             (None, None) => None,
             _ => {
-                let message = "following targets needs the time and the camera's pose".to_owned();
+                let message =
+                    "tracking targets needs both the time and the camera's pose".to_owned();
                 let hint = "give both time_s and world_from_cam, or neither".to_owned();
                 return Err(with_hint(message, Some(hint)));
             }
@@ -109,7 +110,7 @@ impl Perception {
             Ok::<_, deepfusion::perception::Error>(found)
         };
         let found = py.detach(|| {
-            // Taken outside of the pool, as that of a network is (`Model::predict`).
+            // The lock is taken outside of the pool, as in `Model::predict`.
             let mut perceiver = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
             let perceiver = &mut *perceiver;
             deepfusion_cli::in_this_process(|| detect(perceiver))
@@ -126,7 +127,7 @@ impl Perception {
     }
 }
 
-/// Cosine of the angle from which on a camera does not look ahead, so that nothing is said of what the vehicle meets: sixty degrees.
+/// Cosine of 60 degrees, the angle from which on a camera does not look ahead and no collision is computed.
 const LOOKS_ASIDE: f64 = 0.5;
 
 fn to_json(found: &Surroundings, collision: Option<Collision>) -> PyResult<String> {
@@ -147,13 +148,13 @@ fn to_json(found: &Surroundings, collision: Option<Collision>) -> PyResult<Strin
     serde_json::to_string(&found).map_err(|e| PyValueError::new_err(e.to_string()))
 }
 
-/// Settings over others.
+/// The base settings, changed by those in JSON.
 fn over(base: &PerceptionConfig, settings: &str) -> PyResult<PerceptionConfig> {
     let wrong = |e: serde_json::Error| {
         let known = serde_json::to_value(base).ok();
         let known = known.and_then(|known| Some(known.as_object()?.keys().cloned().collect()));
         let known: Vec<String> = known.unwrap_or_default();
-        let hint = format!("the settings are {}", known.join(", "));
+        let hint = format!("known settings: {}", known.join(", "));
         with_hint(format!("settings: {e}"), Some(hint))
     };
     let mut all = serde_json::to_value(base).map_err(wrong)?;
@@ -165,7 +166,7 @@ fn over(base: &PerceptionConfig, settings: &str) -> PyResult<PerceptionConfig> {
     serde_json::from_value(all).map_err(wrong)
 }
 
-/// The values of an array of H x W metres.
+/// An array of H x W metres as a depth map.
 pub(crate) fn depth_map(array: &PyReadonlyArray2<'_, f32>) -> DepthMap {
     DepthMap {
         width: array.shape()[1],
@@ -174,7 +175,7 @@ pub(crate) fn depth_map(array: &PyReadonlyArray2<'_, f32>) -> DepthMap {
     }
 }
 
-/// A rigid transform of a 4×4 matrix.
+/// A 4×4 matrix as a rigid transform.
 fn transform(matrix: &PyReadonlyArray2<'_, f64>) -> PyResult<Se3> {
     let m = matrix.as_array();
     if m.shape() != [4, 4] {
@@ -185,7 +186,7 @@ fn transform(matrix: &PyReadonlyArray2<'_, f64>) -> PyResult<Se3> {
     let rotation = Matrix3::from_fn(at);
     let identity = rotation * rotation.transpose() - Matrix3::identity();
     if !(identity.norm() < 1e-3 && rotation.determinant() > 0.0) {
-        let message = "world_from_cam: its upper left 3 x 3 is no rotation";
+        let message = "world_from_cam: its upper left 3 x 3 matrix is not a rotation";
         return Err(PyValueError::new_err(message));
     }
     let translation = Vector3::from_fn(|row, _| at(row, 3));

@@ -1,4 +1,4 @@
-//! What a network says of an image.
+//! A network's prediction for an image.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -23,13 +23,13 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 /// Metric depth of an image.
 #[pyclass(frozen, module = "deepfusion")]
 pub(crate) struct Prediction {
-    /// Where it was made ahead of whoever asks.
+    /// Depth, if it was computed in advance.
     made: Mutex<Option<DepthMap>>,
     prediction: deepfusion::Prediction,
     image: RgbImage,
     camera: Option<Intrinsics>,
     factors: Arc<IntervalFactors>,
-    /// Each made once: whoever asks again gets the same array.
+    /// Each array is made once; later calls return the same one.
     depth: PyOnceLock<Plane>,
     sigma: PyOnceLock<Option<Plane>>,
     confidence: PyOnceLock<Option<Plane>>,
@@ -56,14 +56,14 @@ impl Prediction {
         }
     }
 
-    /// Depth, and its standard deviation as the command has it.
+    /// Depth, and its calibrated standard deviation as the command writes it.
     fn stretched_sigma(&self) -> Option<(DepthMap, DepthMap)> {
         let depth = self.prediction.depth();
         let sigma = sigma(&self.prediction, &depth, &self.factors)?;
         Some((depth, sigma))
     }
 
-    /// Whether anything says the camera.
+    /// Whether the image's camera is known.
     pub(crate) fn knows_camera(&self) -> bool {
         self.camera.is_some()
     }
@@ -74,7 +74,7 @@ impl Prediction {
         self.prediction.window == [0, 0, width, height]
     }
 
-    /// With its depth made already.
+    /// Computes the depth in advance.
     pub(crate) fn with_depth(self) -> Self {
         let made = Mutex::new(Some(self.prediction.depth()));
         Self { made, ..self }
@@ -197,8 +197,8 @@ impl Prediction {
     fn cloud<'py>(&self, py: Python<'py>, max_depth: f32) -> PyResult<Points<'py>> {
         let Some(camera) = self.camera else {
             return Err(with_hint(
-                "a cloud needs the camera, and none is known of this image".into(),
-                Some("predict(image, intrinsics=(fx, fy, cx, cy))".into()),
+                "a cloud needs the camera, and the camera of this image is unknown".into(),
+                Some("give the camera: predict(image, intrinsics=(fx, fy, cx, cy))".into()),
             ));
         };
         let depth = depth_map(&self.depth(py)?.bind(py).try_readonly()?);

@@ -23,13 +23,13 @@ use crate::device;
 use crate::error::{Failure, raise, warn};
 use crate::interrupt::{Stop, interruptible};
 
-/// What was asked for, as `deepfusion/__init__.py` arranges it.
+/// The arguments, as `deepfusion/_train.py` passes them.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct TrainRequest {
-    /// A preset's name, or a TOML file; the default, or the run's that goes on, where none is given.
+    /// A preset's name or a TOML file; without it, the default or the configuration of the resumed run.
     config: Option<PathBuf>,
-    /// `key=value` over it.
+    /// Changes of the configuration, as `key=value`.
     settings: Vec<String>,
     data: Vec<PathBuf>,
     validation: Vec<PathBuf>,
@@ -41,7 +41,7 @@ struct TrainRequest {
     device: String,
 }
 
-/// The other workers, as an object of Python's connects them: `rank`, `count` and `sum(array)`.
+/// The connection to the other workers, a Python object with `rank`, `count` and `sum(array)`.
 #[derive(FromPyObject)]
 struct PythonWorkers {
     rank: usize,
@@ -51,18 +51,18 @@ struct PythonWorkers {
 }
 
 impl PythonWorkers {
-    /// Fails where another worker could not begin: who waited for its gradients would wait for ever. One that could not itself fails
-    /// with its own error.
+    /// Fails if another worker could not start: waiting for its gradients would last forever. A worker that could not start itself fails with
+    /// its own error.
     fn all_begun(&self, own: bool) -> Result<(), Failure> {
         let mut failed = [if own { 0.0 } else { 1.0 }];
         let summed = self.another().sum(&mut failed);
         match summed {
             Ok(()) if own && failed[0] > 0.0 => Err(Failure {
                 message: format!(
-                    "worker {} of {}: another worker could not begin",
+                    "worker {} of {}: another worker could not start",
                     self.rank, self.count
                 ),
-                hint: Some("its own error says why".into()),
+                hint: Some("see that worker's error".into()),
             }),
             Err(error) if own => Err(Failure {
                 message: format!("worker {} of {}: {error}", self.rank, self.count),
@@ -100,7 +100,7 @@ impl Workers for PythonWorkers {
     }
 }
 
-/// Trains; gives the run's figures as a dict.
+/// Trains and returns the run's results as a dict.
 #[pyfunction]
 pub(crate) fn train<'py>(
     py: Python<'py>,
@@ -109,7 +109,7 @@ pub(crate) fn train<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let asked: TrainRequest = asked.extract()?;
     let mut listener = Listener::new(callback);
-    // As the command does: every operation needs again what the one before freed.
+    // As in the command: each operation needs the memory that the previous one freed.
     deepfusion_cli::keep_memory();
     let outcome = interruptible(py, |stop| -> Result<_, Failure> {
         let mut warnings = Warnings::default();
@@ -122,7 +122,7 @@ pub(crate) fn train<'py>(
         let summary = trainer.run(listen)?;
         Ok((summary, warnings.skipped))
     });
-    // What the listener raised is the reason; the run is saved.
+    // The listener's exception is the reason; the run is saved.
     if let Some(raised) = listener.raised {
         return Err(raised);
     }
@@ -143,7 +143,7 @@ pub(crate) fn train<'py>(
     Ok(figures)
 }
 
-/// The trainer that is asked for, and what is said of it before its first step.
+/// The requested trainer; issues its warnings and opens its log.
 fn begin(
     asked: &TrainRequest,
     warnings: &mut Warnings,
@@ -151,14 +151,14 @@ fn begin(
 ) -> Result<(Trainer, Option<RunLock>), Failure> {
     let (trainer, lock) = opened(asked, warnings)?;
     listener.warn(warnings);
-    // The first worker's log is of all of them.
+    // Only the first worker logs.
     if asked.workers.as_ref().is_none_or(|w| w.rank == 0) {
         listener.keep_log(&trainer)?;
     }
     Ok((trainer, lock))
 }
 
-/// What may not be meant of the recordings.
+/// Warnings about the recordings.
 #[derive(Default)]
 pub(crate) struct Warnings {
     /// Why drives were left out.
@@ -174,7 +174,7 @@ impl Warnings {
         }
     }
 
-    /// Each once: a recording may be opened to learn from and to validate on.
+    /// Adds each warning once: a recording may be opened both for training and for validation.
     pub(crate) fn add_others(&mut self, warnings: Vec<String>) {
         for warning in warnings {
             if !self.others.contains(&warning) {
@@ -184,7 +184,7 @@ impl Warnings {
     }
 }
 
-/// The samples of a configuration, and what may not be meant of them and of their recordings.
+/// The samples of a configuration; adds warnings about them and their recordings.
 fn samples(
     config: &TrainConfig,
     warnings: &mut Warnings,
@@ -199,7 +199,7 @@ fn samples(
     Ok(sets)
 }
 
-/// What may not be meant of the weights to start from.
+/// The warning about the weights to start from, if any.
 pub(crate) fn warning_of(start: &StartReport) -> Option<String> {
     match start {
         StartReport::OtherMeaning(warning) => Some(warning.to_string()),
@@ -207,7 +207,7 @@ pub(crate) fn warning_of(start: &StartReport) -> Option<String> {
     }
 }
 
-/// The trainer that is asked for, and of the first worker the lock of the run's folder.
+/// The requested trainer and, for the first worker, the lock of the run's folder.
 fn opened(
     asked: &TrainRequest,
     warnings: &mut Warnings,
@@ -225,7 +225,7 @@ fn opened(
         let run = folder.read_settings()?;
         let config = go_on_with(&run, &asked.to_resume(place.compute())?)?;
         config.validate()?;
-        // What is wrong with the run is said before the recordings are looked at, which may take long.
+        // The run's errors are reported before the recordings are opened, which may take long.
         folder.require_checkpoint(CheckpointKind::Last)?;
         if let Some(steps) = config.steps {
             let made = folder.read_state(CheckpointKind::Last)?.step;
@@ -234,19 +234,19 @@ fn opened(
         let sets = samples(&config, warnings)?;
         let settings = config.clone();
         let trainer = Trainer::resume_among(workers, config, folder.clone(), sets, &device)?;
-        // How many epochs are is known now.
+        // The number of steps of the epochs is known only now.
         require_no_fewer_steps(&run, &settings, trainer.step(), trainer.steps())?;
-        // Only settings with which the run goes on.
+        // Written only now, since settings with which the run cannot continue are refused above.
         if leads {
             folder.write_config(&settings, &folder.read_findings()?)?;
         }
         return Ok((trainer, lock));
     }
-    if leads && holds_something(&asked.out) {
+    if leads && is_occupied(&asked.out) {
         return Err(Failure {
             message: format!("{}: is not empty", asked.out.display()),
             hint: Some(
-                "choose another folder, empty this one first, or go on with the run in it (resume=True)".into(),
+                "choose another folder, empty this one first, or continue the run in it (resume=True)".into(),
             ),
         });
     }
@@ -269,7 +269,7 @@ fn opened(
     Ok((trainer, lock))
 }
 
-/// The lock of a run's folder, of the worker that writes there.
+/// The lock of a run's folder, for the worker that writes there.
 fn lock_of(folder: &RunFolder, leads: bool) -> Result<Option<RunLock>, Failure> {
     Ok(if leads {
         Some(RunLock::take(folder.path())?)
@@ -278,8 +278,8 @@ fn lock_of(folder: &RunFolder, leads: bool) -> Result<Option<RunLock>, Failure> 
     })
 }
 
-/// Whether there is anything at a path but an empty folder.
-fn holds_something(path: &Path) -> bool {
+/// Whether a path exists and is not an empty folder.
+fn is_occupied(path: &Path) -> bool {
     match std::fs::read_dir(path) {
         Ok(mut entries) => entries.next().is_some(),
         Err(_) => path.exists(),
@@ -287,7 +287,7 @@ fn holds_something(path: &Path) -> bool {
 }
 
 impl TrainRequest {
-    /// What is asked of a run that goes on, by the command's rules: it may be made longer, and its recordings may have moved.
+    /// The request to resume a run, by the command's rules: it may be made longer, and its recordings may have moved.
     fn to_resume(&self, compute: Compute) -> Result<ResumeRequest, Failure> {
         let mut request = ResumeRequest {
             moved: MovedRecordings {
@@ -326,8 +326,8 @@ fn preset_named(name: &Path) -> Option<Preset> {
     all.find(|preset| Path::new(preset.name()) == name)
 }
 
-/// The configuration that is asked for, and whether it is a preset's: no file then says what the run starts from. A preset's sizes follow
-/// what it is trained on.
+/// The requested configuration, and whether it is a preset's, which does not state what the run starts from. A preset's sizes depend on the
+/// device.
 fn configuration(asked: &TrainRequest, compute: Compute) -> Result<(TrainConfig, bool), Failure> {
     let given = asked.config.as_deref();
     let given = given.unwrap_or(Path::new(Preset::Tiny.name()));
@@ -339,7 +339,7 @@ fn configuration(asked: &TrainRequest, compute: Compute) -> Result<(TrainConfig,
             return Err(Failure {
                 message: format!("config: no preset `{}`", given.display()),
                 hint: Some(format!(
-                    "a preset ({}), the path of a TOML file, or a dict",
+                    "give a preset ({}), the path of a TOML file, or a dict",
                     names.join(", ")
                 )),
             });
@@ -352,21 +352,21 @@ fn configuration(asked: &TrainRequest, compute: Compute) -> Result<(TrainConfig,
     choose_data(&mut config, asked)?;
     if config.data.paths.is_empty() && config.data.sets.is_empty() {
         return Err(Failure {
-            message: "data: nothing to learn from".into(),
-            hint: Some("train(config, data): a recording's path or several; or data.paths in the configuration".into()),
+            message: "data: no recordings to train on".into(),
+            hint: Some("give one or more paths of recordings, as train(config, data) or as data.paths in the configuration".into()),
         });
     }
     Ok((config, preset.is_some()))
 }
 
-/// The recordings that are given, in place of the configuration's own.
+/// Replaces the configuration's recordings by those that are given.
 fn choose_data(config: &mut TrainConfig, asked: &TrainRequest) -> Result<(), Failure> {
     let given = !asked.data.is_empty() || !asked.validation.is_empty();
     if given && !config.data.sets.is_empty() {
         return Err(Failure {
-            message: "data: the configuration has data.sets of its own".into(),
+            message: "data: not allowed beside data.sets in the configuration".into(),
             hint: Some(
-                "leave data and validation out, or take data.sets out of the configuration".into(),
+                "leave out data and validation, or remove data.sets from the configuration".into(),
             ),
         });
     }
@@ -385,13 +385,13 @@ fn choose_data(config: &mut TrainConfig, asked: &TrainRequest) -> Result<(), Fai
     Ok(())
 }
 
-/// Hears the trainer's events, logs them as the command does, and calls Python.
+/// Receives the trainer's events, logs them as the command does, and calls Python.
 pub(crate) struct Listener {
     callback: Option<Py<PyAny>>,
     log: Option<RunLog>,
-    /// What went wrong in it: training stops, and this is raised.
+    /// The exception of the callback: training stops, and it is raised.
     pub raised: Option<PyErr>,
-    /// It answered False, whatever the event was: training stops where its listener is next asked.
+    /// Whether the callback returned False for any event: training stops at the next chance.
     ends: bool,
     losses: Option<LossTerms>,
     validation: Option<LossTerms>,
@@ -417,7 +417,7 @@ impl Listener {
         Ok(())
     }
 
-    /// As Python's own warnings; where those are errors, the first stops the run.
+    /// Issues Python warnings; if those are errors, the first stops the run.
     pub(crate) fn warn(&mut self, warnings: &Warnings) {
         for text in &warnings.others {
             let warned = Python::attach(|py| warn(py, text));
@@ -444,7 +444,7 @@ impl Listener {
         }
     }
 
-    /// Whether to go on.
+    /// Handles an event and returns whether to continue.
     fn handle(&mut self, event: TrainEvent) -> PyResult<bool> {
         self.record(&event)?;
         let Some(callback) = &self.callback else {
@@ -452,12 +452,12 @@ impl Listener {
         };
         Python::attach(|py| {
             let answer = callback.call1(py, (as_dict(py, event)?,))?;
-            // None is no answer: only False ends it.
+            // Only False stops the training, None does not.
             Ok(!matches!(answer.extract::<bool>(py), Ok(false)))
         })
     }
 
-    /// Keeps an event's figures, and what the run's files have of it.
+    /// Keeps an event's results and writes it to the run's log.
     fn record(&mut self, event: &TrainEvent) -> PyResult<()> {
         match event {
             TrainEvent::Step {
@@ -479,7 +479,7 @@ fn terms(losses: LossTerms) -> BTreeMap<&'static str, f64> {
     losses.named().into_iter().collect()
 }
 
-/// An event as a dict; `event` says which.
+/// An event as a dict; its key `event` is the kind.
 fn as_dict(py: Python<'_>, event: TrainEvent) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);
     let name = match event {

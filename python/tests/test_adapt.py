@@ -1,4 +1,4 @@
-"""A network adapted to a simulated street, seen from Python."""
+"""A network adapted to a simulated street, through Python."""
 
 import deepfusion
 import numpy as np
@@ -13,9 +13,9 @@ def street(tmp_path_factory):
     return deepfusion.simulate(out, frames=60, seed=90110, size=(320, 96), scan_every=0)
 
 
-def test_what_gets_no_worse_is_kept_and_can_be_undone(street, tmp_path):
+def test_a_network_that_gets_no_worse_is_kept_and_can_be_undone(street, tmp_path):
     events = []
-    # Steps too small to change anything: as good as before.
+    # Steps too small to change anything: the network stays as good as before.
     found = deepfusion.adapt(street, callback=events.append, out=tmp_path / "mine", learning_rate=1e-9, **QUICK)
     assert found.kept and found.worse == [] and found.path == tmp_path / "mine"
     assert (found.source, found.steps) == ("tiny", 2)
@@ -33,14 +33,14 @@ def test_what_gets_no_worse_is_kept_and_can_be_undone(street, tmp_path):
         found.undo()
 
 
-def test_what_gets_worse_is_laid_aside(street, tmp_path):
+def test_a_network_that_gets_worse_is_moved_aside(street, tmp_path):
     ruin = {"learning_rate_warmup_steps": 0}
     found = deepfusion.adapt(street, out=tmp_path / "mine", learning_rate=0.03, config=ruin, **QUICK)
     assert not found.kept and found.worse
     assert found.path == tmp_path / "mine.refused" and not (tmp_path / "mine").exists()
 
 
-def test_a_stopped_one_goes_on_with_the_same_call(street, tmp_path):
+def test_a_stopped_adaptation_continues_with_the_same_call(street, tmp_path):
     def first_step(event):
         return event["event"] != "step"
 
@@ -53,7 +53,7 @@ def test_a_stopped_one_goes_on_with_the_same_call(street, tmp_path):
         deepfusion.adapt(street, **arguments)
 
 
-def test_the_simulated_camera_is_their_own_or_any(street, tmp_path):
+def test_the_simulated_camera_is_the_drives_own_or_any(street, tmp_path):
     with pytest.raises(deepfusion.DeepFusionError, match="simulated_camera: `mine`") as refused:
         deepfusion.adapt(street, out=tmp_path / "mine", **{**QUICK, "simulated_camera": "mine"})
     assert "own" in refused.value.hint

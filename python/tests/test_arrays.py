@@ -22,7 +22,7 @@ def model():
     return deepfusion.load("tiny")
 
 
-def test_many_images_are_those_of_one_at_a_time(drive, model, tmp_path):
+def test_many_images_give_the_same_as_one_at_a_time(drive, model, tmp_path):
     recording = deepfusion.Dataset(drive)
     camera = recording[0].intrinsics
     expected = [model.predict(frame.image, camera) for frame in recording]
@@ -34,7 +34,7 @@ def test_many_images_are_those_of_one_at_a_time(drive, model, tmp_path):
             assert np.array_equal(prediction.depth, expected[i % 6].depth)
             assert np.array_equal(prediction.disparity, expected[i % 6].disparity)
     assert list(model.predict_many([])) == []
-    # What is wrong with one is raised at its turn; the others come.
+    # An error of one image is raised at its turn; the others follow.
     (tmp_path / "broken.png").write_bytes(b"no picture")
     mixed = model.predict_many([files[0], tmp_path / "broken.png", files[1]], camera)
     assert np.array_equal(next(mixed).depth, expected[0].depth)
@@ -106,7 +106,7 @@ def test_targets_of_exact_depth(drive):
         frame_depth(drive, 0), frame.intrinsics, speed_mps=8.0, yaw_rate_radps=0.4
     )
     assert met.collision is not None and met.collision.id in {t.id for t in met.targets}
-    # A camera that looks to the side does not see what the vehicle's front meets.
+    # A camera that looks to the side does not see what the vehicle's front may hit.
     for yaw in (None, 1.2, -1.2, 3.0):
         aside = deepfusion.Perception(exact=True).detect(
             frame_depth(drive, 0), frame.intrinsics, speed_mps=8.0, yaw_rate_radps=0.4, camera_yaw_rad=yaw
@@ -124,7 +124,7 @@ def frame_depth(drive, index):
 
 
 def test_targets_are_the_commands(drive, model, tmp_path):
-    """Followed over a drive, number for number."""
+    """Tracked over a drive, number for number."""
     out = tmp_path / "targets"
     arguments = ["perceive", drive, "--model", "tiny", "--out", str(out), "--save", "depth-png", "--quiet"]
     subprocess.run([sys.executable, "-m", "deepfusion", *arguments], check=True)
@@ -197,7 +197,7 @@ def test_snippets(drive):
     assert np.array_equal(sample["image"], recording[1].image)
     assert sample["sources"].shape == (2, *sample["image"].shape)
     assert np.array_equal(sample["sources"][1], recording[2].image)
-    # Ahead of the camera is nearer from the next frame, farther from the last.
+    # A point ahead is nearer in the next frame and farther in the previous one.
     ahead = sample["source_from_target"] @ (0, 0, 20, 1)
     assert ahead[1][2] < 20 < ahead[0][2]
     assert sample["intrinsics"][0, 2] == np.float32(recording[1].intrinsics[2])

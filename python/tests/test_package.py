@@ -64,7 +64,7 @@ def test_image_to_metres(drive, model):
     # Row by row: z is the depth itself.
     assert np.array_equal(xyz[:, 2], depth[depth <= 40])
     assert np.array_equal(rgb, frame.image[depth <= 40])
-    # What is taken out of the depth is in no cloud.
+    # Pixels removed from the depth are not in the cloud.
     depth[len(depth) // 2 :] = 0
     assert len(prediction.cloud(max_depth=40)[0]) == ((depth > 0) & (depth <= 40)).sum() < len(xyz)
 
@@ -77,7 +77,7 @@ def test_arrays_are_made_once(drive):
 
 
 def test_how_far_to_trust_a_pixel(drive, model):
-    """exp(-the error that is to be expected), as the standard deviation beside it says."""
+    """exp(-expected error), computed from the standard deviation."""
     frame = deepfusion.Dataset(drive)[0]
     seen = deepfusion.load("street").predict(frame.image, frame.intrinsics)
     inside = seen.depth > 0
@@ -88,7 +88,7 @@ def test_how_far_to_trust_a_pixel(drive, model):
 
 
 def test_how_sure_it_is_is_the_commands(drive, tmp_path):
-    """`street` has factors that stretch what it says of its own error."""
+    """`street` has factors that scale its predicted sigma."""
     command = os.environ.get("DEEPFUSION") or str(Path(sysconfig.get_path("scripts")) / "deepfusion")
     frame = deepfusion.Dataset(drive)[0]
     out = tmp_path / "sure"
@@ -98,7 +98,7 @@ def test_how_sure_it_is_is_the_commands(drive, tmp_path):
         assert np.array_equal(np.load(sorted(out.glob(f"*_{what}.npy"))[0]), ours), what
 
 
-def test_what_is_no_image_is_raised_at_its_turn(drive, model):
+def test_an_object_that_is_no_image_raises_at_its_turn(drive, model):
     frame = deepfusion.Dataset(drive)[0]
     predictions = model.predict_many([frame.image, frame.image, 7, frame.image], frame.intrinsics)
     assert next(predictions).depth.shape == next(predictions).depth.shape
@@ -117,7 +117,7 @@ def test_what_is_no_image_is_raised_at_its_turn(drive, model):
 
 
 def test_a_phones_picture_is_upright(drive, model, tmp_path):
-    """EXIF's orientation 6: held upright, the pixels lie on their side."""
+    """EXIF's orientation 6: the camera was upright, but the pixels are rotated."""
     picture = Image.fromarray(deepfusion.Dataset(drive)[0].image)
     exif = Image.Exif()
     exif[0x0112] = 6
@@ -127,7 +127,7 @@ def test_a_phones_picture_is_upright(drive, model, tmp_path):
     with Image.open(file) as opened:
         from_pil = model.predict(opened, (300, 300, 60, 200))
     assert from_file.depth.shape == from_pil.depth.shape == (picture.width, picture.height)
-    # Decoders differ by a step of a byte.
+    # Decoders may differ by 1 of 255.
     assert np.median(np.abs(np.log(from_file.depth / from_pil.depth))) < 0.02
 
 
@@ -148,7 +148,7 @@ def test_a_camera_is_four_numbers_or_a_matrix(drive, model):
     assert "0 0 1" in refused.value.hint
 
 
-def test_a_picture_that_pil_opened_says_its_lens(drive, model, tmp_path):
+def test_a_picture_that_pil_opened_has_its_lens(drive, model, tmp_path):
     picture = Image.fromarray(deepfusion.Dataset(drive)[0].image)
     exif = Image.Exif()
     exif[0x0112] = 1
@@ -159,7 +159,7 @@ def test_a_picture_that_pil_opened_says_its_lens(drive, model, tmp_path):
         with Image.open(file) as opened:
             assert model.predict(opened).intrinsics == model.predict(file).intrinsics
             assert model.predict(opened).intrinsics is not None
-            # Of one that was cut the focal length is not true.
+            # After cropping, the focal length is wrong.
             assert model.predict(opened.crop((0, 0, 96, 64))).intrinsics is None
 
 
@@ -176,7 +176,7 @@ def test_every_kind_of_image_is_the_same_image(drive, model, tmp_path):
 
 
 def test_sixteen_bits_are_eight_as_in_a_file(drive, model, tmp_path):
-    """PIL's own conversion would make nearly all of it white."""
+    """PIL's own conversion would make nearly all pixels white."""
     frame = deepfusion.Dataset(drive)[0]
     grey = frame.image.mean(axis=2) * 257
     file = tmp_path / "grey.png"
@@ -199,7 +199,7 @@ def test_a_recording(drive):
     assert recording[-1].number == 2
     with pytest.raises(IndexError):
         recording[3]
-    # The camera drives ahead: what it saw at z comes nearer.
+    # The camera moves forward, so points ahead come nearer.
     motion = recording.motion(0, 1)
     distance = np.linalg.norm(motion[:3, 3])
     assert motion[2, 3] < 0 and 0.1 < distance < 3
@@ -261,7 +261,7 @@ def test_the_view_is_a_camera(drive, model):
             model.predict(frame, **wrong)
 
 
-def test_a_camera_that_nothing_says_is_warned_of_once(drive):
+def test_an_unknown_camera_gives_one_warning(drive):
     model = deepfusion.load("tiny")
     image = deepfusion.Dataset(drive)[0].image
     with warnings.catch_warnings():
@@ -273,7 +273,7 @@ def test_a_camera_that_nothing_says_is_warned_of_once(drive):
         list(model.another().predict_many([image]))
 
 
-def test_what_a_recording_does_not_say_can_be_said(drive, tmp_path):
+def test_what_a_recording_lacks_can_be_given(drive, tmp_path):
     folder = folder_of(drive, tmp_path / "folder")
     (folder / "intrinsics.txt").unlink()
     with pytest.raises(deepfusion.DeepFusionError):
@@ -303,7 +303,7 @@ def test_what_a_recording_does_not_say_can_be_said(drive, tmp_path):
             deepfusion.Dataset(folder, **wrong)
     with pytest.raises(TypeError, match="topics"):
         deepfusion.Dataset(folder, topics=["image"])
-    # Topics are a bag's.
+    # Only bags have topics.
     with pytest.raises(deepfusion.DeepFusionError):
         deepfusion.Dataset(folder, hfov_deg=90, topics={"image": "/camera"})
 
@@ -317,11 +317,11 @@ def test_a_log_by_itself(tmp_path):
         deepfusion.doctor(log, hfov_deg=90)
 
 
-def test_what_opens_again_is_pickled(drive, model, monkeypatch, tmp_path):
+def test_objects_that_can_be_reopened_are_pickled(drive, model, monkeypatch, tmp_path):
     monkeypatch.chdir(Path(drive).parent)
     recording = deepfusion.Dataset(Path(drive).name)
     text = pickle.dumps((recording, recording[1], recording[2], model))
-    # Wherever the other process stands.
+    # Whatever the other process's current folder.
     monkeypatch.chdir(tmp_path)
     again, frame, last, network = pickle.loads(text)
     assert again.name == recording.name and (frame, last) == (recording[1], recording[2])
@@ -371,7 +371,7 @@ def test_one_thread_takes_predictions(drive, model):
         model.predict_many([], ahead=0)
 
 
-def test_what_is_no_image_says_what_makes_it_one(drive, model):
+def test_an_array_that_is_no_image_says_how_to_convert_it(drive, model):
     image = deepfusion.Dataset(drive)[0].image
     for wrong, said in [
         (image / np.float32(255), "found float32 96 x 320 x 3.*astype"),
@@ -394,7 +394,7 @@ def test_what_is_no_image_says_what_makes_it_one(drive, model):
 
 
 def folder_of(drive, out):
-    """The same images as a plain folder with speeds, whose mount nothing says."""
+    """The same images as a plain folder with speeds, without the camera's mount."""
     frames = list(deepfusion.Dataset(drive))
     shutil.copytree(Path(drive) / "image_02" / "data", out / "images")
     (out / "frames.csv").write_text("time_s,file\n" + "".join(f"{f.time_s:.6f},{f.number:010}.png\n" for f in frames))
@@ -404,7 +404,7 @@ def folder_of(drive, out):
     return out
 
 
-def test_what_may_not_be_meant_of_a_recording_is_a_warning(drive, tmp_path):
+def test_doubts_about_a_recording_are_warnings(drive, tmp_path):
     folder = folder_of(drive, tmp_path / "folder")
     with pytest.warns(UserWarning, match="straight ahead"):
         recording = deepfusion.Dataset(folder)
@@ -433,8 +433,8 @@ def test_the_metrics_are_the_fields():
     assert inverse["unscaled"]["abs_rel"] == pytest.approx(report["unscaled"]["abs_rel"], rel=1e-6)
 
 
-def test_what_predicts_nothing_somewhere_can_be_left_out():
-    """`Prediction.depth` is 0 outside of what the network looked at."""
+def test_pixels_without_a_prediction_can_be_left_out():
+    """`Prediction.depth` is 0 outside of the part that the network saw."""
     truth = np.full((4, 6), 10.0)
     predicted = np.full((4, 6), 11.0)
     predicted[:2] = 0
@@ -452,7 +452,7 @@ def test_what_predicts_nothing_somewhere_can_be_left_out():
 
 
 def test_columns_of_records_are_measured():
-    """Their numbers do not lie one behind the other."""
+    """Their numbers are not contiguous."""
     truth = np.linspace(2, 30, 24).reshape(4, 6)
     records = np.zeros((4, 6), dtype=[("z", "<f8"), ("ok", "u1")])
     records["z"] = 1.1 * truth
@@ -505,7 +505,7 @@ def test_errors_say_what_to_do(drive, model, tmp_path):
 
 @pytest.mark.parametrize(("precision", "most"), [("bf16", 0.005), ("int8", 0.015)])
 def test_lower_precision(drive, precision, most):
-    """Nearly the same depth on a processor that has it, and an error that says which would on another."""
+    """Nearly the same depth on a processor that has it; on another an error that says which do."""
     frame = deepfusion.Dataset(drive)[0]
     try:
         lower = deepfusion.load("street", precision=precision)
@@ -521,7 +521,7 @@ def test_lower_precision(drive, precision, most):
 
 
 def test_threads(drive, model):
-    """Another estimator a thread gives the same; the interpreter is free while they work."""
+    """One estimator per thread gives the same results; the interpreter is free while they work."""
     frames = list(deepfusion.Dataset(drive))
     expected = [model.predict(f.image, f.intrinsics).depth for f in frames]
     found = [None] * len(frames)
@@ -540,7 +540,7 @@ def test_threads(drive, model):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
 def test_the_child_of_a_fork_computes(drive):
-    """As multiprocessing starts processes on Linux before Python 3.14, and DataLoader its workers: none of the parent's threads come along."""
+    """As multiprocessing on Linux before Python 3.14 and DataLoader start processes: the child has none of its parent's threads."""
     code = """
         import os, sys, warnings
         import deepfusion, numpy as np
@@ -581,7 +581,7 @@ def test_doctor(drive, tmp_path):
     report = deepfusion.doctor(drive)
     assert report["drives"][0]["frames"] == 3
     said = subprocess.run([sys.executable, "-m", "deepfusion", "doctor", str(drive), "--json"], capture_output=True, check=False)
-    assert report == json.loads(said.stdout), "what the command prints"
+    assert report == json.loads(said.stdout), "as the command prints it"
     assert deepfusion.doctor(tmp_path)["recording"]
 
 
@@ -623,7 +623,7 @@ def test_the_command_gives_the_same_metrics(drive, model, crop):
         kind="disparity",
         crop=crop,
     )
-    # How sharp it is, the command reads off the simulator's dense depth; here the scans are all that is known.
+    # The command computes sharpness from the simulator's dense depth; here only the scans are given.
     both = (ours.keys() & theirs.keys()) - {"sharpness"}
     assert {"n", "protocol", "unscaled", "median_scaled", "scale", "ranges", "hole_rate", "truth_sha256"} <= both
     assert {field: ours[field] for field in both} == {field: theirs[field] for field in both}
@@ -637,7 +637,7 @@ def test_help_says_what_the_stubs_say():
     for group in (node for node in stubs.body if isinstance(node, ast.ClassDef)):
         for method in (node for node in group.body if isinstance(node, ast.FunctionDef)):
             said = ast.get_docstring(method)
-            # What makes an object has no docstring of its own.
+            # Constructors have no docstring of their own.
             if said and method.name != "__new__":
                 there = getattr(getattr(deepfusion, group.name), method.name).__doc__
                 assert there and inspect.cleandoc(there) == said, f"{group.name}.{method.name}"

@@ -1,4 +1,4 @@
-"""The work of a cluster, on one machine with two workers."""
+"""The package on a Ray cluster: one machine with two workers."""
 
 import io
 import json
@@ -29,7 +29,7 @@ from deepfusion.ray import _fleet, _predict, _storage, _train, _tune  # noqa: E4
 
 @pytest.fixture(scope="module", autouse=True)
 def two_cores():
-    # No telemetry, no page: a test's cluster is nobody's business.
+    # A test needs no telemetry and no dashboard.
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="warning")
     yield
@@ -52,15 +52,15 @@ def street(tmp_path_factory):
 CAMERA = (140.0, 140.0, 96.0, 32.0)
 
 
-def test_outputs_are_no_inputs(street, tmp_path):
-    """Of a folder that is searched whole, in which the outputs lie as well."""
+def test_outputs_are_not_inputs(street, tmp_path):
+    """In a folder that is searched completely and also contains the outputs."""
     images = tmp_path / "images"
     shutil.copytree(street, images)
     for out in [images / "depth", images]:
         for done, kept in [(6, 0), (0, 6)]:
             summary = cluster.predict(images, "tiny", out, intrinsics=CAMERA, workers=2)
             assert (summary.images, summary.done, summary.kept, summary.failed) == (6, done, kept, [])
-    # A picture of depth that no sidecar lists is an image as others are.
+    # A picture of depth that no sidecar lists is an ordinary image.
     Image.new("RGB", (8, 8)).save(images / "a_depth.png")
     (images / "a.json").write_text("{}")
     assert len(_storage.images([str(images)], {})) == 7
@@ -90,18 +90,18 @@ def test_each_image_once_and_as_the_command_does_it(street, tmp_path):
     assert sidecar["intrinsics"] == list(CAMERA) and sidecar["size"] == [192, 64]
     assert not list(out.rglob("*.tmp"))
 
-    # Again: nothing is made. A file that was cut off: that image is.
+    # A second time, nothing is predicted; after truncating a file, only its image is.
     written = {file: file.stat().st_mtime_ns for file in out.rglob("*.*")}
     again = cluster.predict(street, "tiny", out, **job)
     assert (again.done, again.kept) == (0, 6)
     assert written == {file: file.stat().st_mtime_ns for file in out.rglob("*.*")}
     (out / "left" / "1_depth.npy").write_bytes(bytes(len((out / "left" / "1_depth.npy").read_bytes())))
     os.truncate(out / "mirrored" / "2_depth.png", 40)
-    mended = cluster.predict(street, "tiny", out, **job)
-    assert (mended.done, mended.kept) == (2, 4)
+    repaired = cluster.predict(street, "tiny", out, **job)
+    assert (repaired.done, repaired.kept) == (2, 4)
     assert np.array_equal(np.load(out / "left" / "1_depth.npy"), model.predict(street / "left" / "1.png", CAMERA).depth)
 
-    # Of something else: said, not mixed in.
+    # Outputs of another job are an error, and not mixed in.
     other = cluster.predict(street, "tiny", out, **(job | {"intrinsics": (150.0, 150.0, 96.0, 32.0)}))
     assert other.done == 0 and len(other.failed) == 6
     assert all("another intrinsics" in why and "overwrite" in why for _, why in other.failed)
@@ -123,7 +123,7 @@ def test_broken_images_are_named_and_the_others_done(street, tmp_path):
         cluster.predict(folder, "no-such-network", tmp_path / "out")
     with pytest.raises(ValueError, match="save"):
         cluster.predict(folder, "tiny", tmp_path / "out", save=["plys"])
-    with pytest.raises(ValueError, match="how sure"):
+    with pytest.raises(ValueError, match="does not predict uncertainty"):
         cluster.predict(folder, "tiny", tmp_path / "out", save=["sigma"])
 
 
@@ -141,13 +141,13 @@ def test_a_worker_that_is_killed_loses_nothing_and_does_nothing_twice(street, tm
     folder.mkdir()
     pixels = np.asarray(Image.open(street / "left" / "0.png"))
     for i in range(200):
-        # Each its own, so that none could stand for another.
+        # Each image is different, so that none can be mistaken for another.
         Image.fromarray(np.roll(pixels, i, axis=1)).save(folder / f"{i:03}.png")
 
     first, killed = {}, []
 
     def kill():
-        """Kills a process of the work once some images are done; notes which those were."""
+        """Kills a worker's process once some images are done, and records which."""
         while len(list(out.glob("*.json"))) < 20:
             time.sleep(0.01)
         first.update({file: file.stat().st_mtime_ns for file in out.glob("*.json")})
@@ -160,11 +160,11 @@ def test_a_worker_that_is_killed_loses_nothing_and_does_nothing_twice(street, tm
     killer.start()
     summary = cluster.predict(folder, "tiny", out, intrinsics=CAMERA, workers=2)
     killer.join()
-    assert killed, "no worker was at work when it was to be killed"
-    assert len(first) < 200, "all was done when the worker was killed"
+    assert killed, "no worker was running that could be killed"
+    assert len(first) < 200, "all images were done before the worker was killed"
     assert (summary.images, summary.done, summary.kept, summary.failed) == (200, 200, 0, [])
     assert len(list(out.glob("*.json"))) == len(list(out.glob("*_depth.png"))) == 200
-    assert all(file.stat().st_mtime_ns == when for file, when in first.items()), "made a second time"
+    assert all(file.stat().st_mtime_ns == when for file, when in first.items()), "predicted a second time"
     assert not [file for file in out.glob("*.json") if json.loads(file.read_text())["image"] != str(folder / f"{file.stem}.png")]
     model = deepfusion.load("tiny")
     for i in [0, 77, 199]:
@@ -186,7 +186,7 @@ def _actors():
 
 @pytest.fixture
 def bucket():
-    """The bucket `fleet` in S3, played by moto's server on this machine: its file system, and the options that find it."""
+    """The bucket `fleet` in S3, simulated by moto's server on this machine: its file system, and the options to connect to it."""
     moto = pytest.importorskip("moto.server")
     s3fs = pytest.importorskip("s3fs")
     server = moto.ThreadedMotoServer(ip_address="127.0.0.1", port=0)
@@ -195,7 +195,7 @@ def bucket():
         host, port = server.get_host_and_port()
         options = {"key": "a", "secret": "b", "client_kwargs": {"endpoint_url": f"http://{host}:{port}"}}
         fs = s3fs.S3FileSystem(**options)
-        # All servers of a process have the same buckets.
+        # All servers of a process share their buckets.
         urllib.request.urlopen(urllib.request.Request(f"http://{host}:{port}/moto-api/reset", method="POST")).close()
         fs.mkdir("fleet")
         yield fs, options
@@ -227,13 +227,13 @@ def memory():
 
 
 def worker(output, **others):
-    """One of a job that saves arrays, in this process."""
+    """A worker of a job that saves arrays, in this process."""
     job = dict(id=output, model="tiny", precision="f32", data_set=None, intrinsics=CAMERA, focal_correction=True, stretch=False,
                post_process=None, save=("npy",), overwrite=False, threads=1, options={}, weights=None, device="cpu", gpus=0)  # fmt: skip
     return _predict._Worker(_predict._Job(output=output, **(job | others)))
 
 
-def test_no_sidecar_of_before_vouches_for_a_depth_that_replaces_its_own(street, memory, monkeypatch):
+def test_an_old_sidecar_does_not_mark_new_depth_as_done(street, memory, monkeypatch):
     monkeypatch.setenv("RAYON_NUM_THREADS", "1")
     image = str(street / "left" / "0.png")
     row = {"image": np.array([image]), "name": np.array(["0"])}
@@ -245,7 +245,7 @@ def test_no_sidecar_of_before_vouches_for_a_depth_that_replaces_its_own(street, 
     first, write = depth(), _storage.Folder.write
 
     def dies(self, name, data):
-        """As a worker that is killed before it writes the sidecar."""
+        """Like a worker that is killed before it writes the sidecar."""
         if name.endswith(".json"):
             raise OSError("killed")
         write(self, name, data)
@@ -266,7 +266,7 @@ def test_whatever_a_file_system_raises_is_one_images_failure(street, memory, mon
 
     def fails(self, path, *arguments, **options):
         if path.endswith("1.png"):
-            # No OSError, as those of botocore are none.
+            # Not an OSError, like botocore's exceptions.
             raise RuntimeError("reset by peer")
         return get(self, path, *arguments, **options)
 
@@ -276,7 +276,7 @@ def test_whatever_a_file_system_raises_is_one_images_failure(street, memory, mon
     assert answer["outcome"] == ["done", "failed", "done"] and "reset by peer" in answer["why"][1]
 
 
-def test_a_folder_of_an_embedded_networks_name_is_meant_where_it_holds_a_run(street, tmp_path, monkeypatch):
+def test_a_folder_with_an_embedded_networks_name_is_used_if_it_is_a_run(street, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "tiny").mkdir()
     (tmp_path / "tiny" / "0.png").write_bytes((street / "left" / "0.png").read_bytes())
@@ -295,7 +295,7 @@ def test_a_folder_of_an_embedded_networks_name_is_meant_where_it_holds_a_run(str
 def test_what_a_worker_cannot_load_ends_the_job_with_the_reason(street, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="int4"):
         cluster.predict(street, "tiny", tmp_path, precision="int4")
-    # As on a machine whose processor cannot tell.
+    # As on a machine whose processor lacks the precision.
     monkeypatch.setattr(_predict, "_check", lambda *_: None)
     with pytest.raises(deepfusion.DeepFusionError) as expected:
         deepfusion.load("tiny", data_set="nowhere")
@@ -330,7 +330,7 @@ def test_this_machines_processor_need_not_compute_as_the_workers_do(monkeypatch)
         _predict._check("tiny", "int8", None, ["npy"], None)
 
 
-def test_a_fleet_is_looked_at(tmp_path):
+def test_a_fleet_is_checked(tmp_path):
     drives = [str(deepfusion.simulate(tmp_path / f"{seed}", frames=4, seed=seed, size=(192, 64))) for seed in (3, 4)]
     rows = cluster.inspect([*drives, tmp_path / "nowhere"])
     assert [row["recording"] for row in rows] == [*drives, str(tmp_path / "nowhere")]
@@ -344,7 +344,7 @@ def test_a_fleet_is_looked_at(tmp_path):
     assert looked[0]["frames"] == 4
 
 
-def test_a_fleets_recording_comes_with_what_lies_beside_it(tmp_path, bucket):
+def test_a_fleets_recording_comes_with_the_files_beside_it(tmp_path, bucket):
     fs, options = bucket
     drive = deepfusion.simulate(tmp_path / "kitti", frames=4, seed=3, size=(192, 64))
     fs.put(str(drive), f"fleet/2011_09_26/{drive.name}", recursive=True)
@@ -375,7 +375,7 @@ def test_what_belongs_to_a_recording_is_known_by_its_name(memory, monkeypatch):
     assert fetched("memory://alone.mp4") == ("alone.mp4", ["alone.mp4"])
 
 
-def test_a_recording_that_cannot_be_looked_at_leaves_the_others(tmp_path, monkeypatch):
+def test_a_recording_that_cannot_be_read_does_not_stop_the_others(tmp_path, monkeypatch):
     monkeypatch.setenv("RAYON_NUM_THREADS", "3")
     drive = str(deepfusion.simulate(tmp_path / "drive", frames=4, seed=3, size=(192, 64)))
 
@@ -413,7 +413,7 @@ def test_trials_of_a_setting(tmp_path):
     selections = [trial.selection for trial in trials]
     assert selections == sorted(selections)
     assert all(trial.step == 2 and (trial.path / "best.safetensors").exists() for trial in trials)
-    # The setting is the run's.
+    # The run has the setting.
     assert deepfusion.load(trials[0].path).step > 0
     assert f"smoothness = {trials[0].settings['loss.smoothness']}" in (trials[0].path / "config.toml").read_text()
 
@@ -437,7 +437,7 @@ def test_settings_are_merged_key_by_key():
     assert _tune.merged({"loss": {"speed": 0.2}}, {"loss.speed": 0.3}) == _tune.merged({"loss.speed": 0.2}, {"loss": {"speed": 0.3}})
 
 
-def test_what_is_not_finite_is_worst():
+def test_values_that_are_not_finite_are_worst():
     nan, inf = math.nan, math.inf
     best = None
     for value, expected in [(nan, None), (0.5, 0.5), (nan, 0.5), (-inf, 0.5), (0.75, 0.5), (0.25, 0.25)]:
@@ -466,7 +466,7 @@ def training_workers():
     return found
 
 
-def test_a_network_is_learned_by_two_workers_though_one_is_killed(tmp_path):
+def test_two_workers_train_a_network_although_one_is_killed(tmp_path):
     pytest.importorskip("torch")
     pytest.importorskip("ray.train.torch")
     street = deepfusion.simulate(tmp_path / "street", frames=16, seed=3, size=(320, 96))
@@ -494,7 +494,7 @@ def test_a_network_is_learned_by_two_workers_though_one_is_killed(tmp_path):
     assert run.losses["total"] == pytest.approx(alone.losses["total"], rel=1e-3)
 
 
-def test_a_run_begins_again_where_a_worker_dies_before_the_first_checkpoint(tmp_path):
+def test_a_run_starts_again_if_a_worker_dies_before_the_first_checkpoint(tmp_path):
     pytest.importorskip("torch")
     pytest.importorskip("ray.train.torch")
     street = deepfusion.simulate(tmp_path / "street", frames=10, seed=3, size=(192, 64))
@@ -520,7 +520,7 @@ def test_a_run_begins_again_where_a_worker_dies_before_the_first_checkpoint(tmp_
     assert len(list(out.glob("events.out.tfevents*"))) == 1
 
 
-def test_only_what_a_run_left_that_had_just_begun_is_removed(tmp_path):
+def test_only_files_of_a_run_that_had_just_started_are_removed(tmp_path):
     out = tmp_path / "run"
     _train._check_begun(out)
     (out / "panels").mkdir(parents=True)
@@ -532,7 +532,7 @@ def test_only_what_a_run_left_that_had_just_begun_is_removed(tmp_path):
     others = {"config.toml": "mine = 1", "log.csv": "time,speed", "notes.txt": "", "best.safetensors": "", "panels/me.png": ""}
     for name, text in others.items():
         (out / name).write_text(text)
-        # Nothing is started, and nothing is lost.
+        # Nothing is started, and no file is lost.
         with pytest.raises(deepfusion.DeepFusionError, match=re.escape(name)) as caught:
             cluster.train(SMALL, tmp_path / "nowhere", out=out)
         assert "another folder" in caught.value.hint
@@ -544,7 +544,7 @@ def test_only_what_a_run_left_that_had_just_begun_is_removed(tmp_path):
     _train._check_begun(out)
 
 
-def test_what_computes_is_checked_before_anything_starts(street, tmp_path):
+def test_the_device_is_checked_before_anything_starts(street, tmp_path):
     def refused(error, **options):
         with pytest.raises(error) as caught:
             cluster.predict(street, "tiny", tmp_path / "out", **options)
@@ -572,7 +572,7 @@ def test_what_computes_is_checked_before_anything_starts(street, tmp_path):
 
 
 def test_the_processor_by_name_is_the_default(street, tmp_path):
-    """The same outputs, so that a job of before goes on."""
+    """The same outputs, so that an earlier job is continued."""
     job = dict(intrinsics=CAMERA, workers=1)
     assert cluster.predict(street / "left", "tiny", tmp_path / "out", **job).done == 3
     assert cluster.predict(street / "left", "tiny", tmp_path / "out", **job, device="cpu", gpus_per_worker=0).kept == 3
@@ -590,7 +590,7 @@ def test_each_worker_takes_a_gpu_of_its_own(monkeypatch):
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "on-a-cluster.md"
 
-# Nothing is learned for long here.
+# The trainings are shortened here.
 SHORTER = [
     ("frames=40", "frames=10, size=(192, 64)"),
     ('"steps": 20', '"steps": 2, "size": {"width": 64, "height": 64}, "validation_share": 0.3'),
@@ -615,7 +615,7 @@ def test_what_the_guide_shows_runs(tmp_path, monkeypatch):
             if launcher is None or not _has("mpi4py"):
                 skipped.add("MPI")
                 continue
-            # Another run than the block before made.
+            # A new run, not the one of the previous block.
             (tmp_path / "learn.py").write_text(shown.replace('out="shared"', 'out="by-mpi"'))
             words = [launcher, "-n", "2", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none", sys.executable, "learn.py"]
             subprocess.run(words, check=True, timeout=300)
@@ -633,8 +633,8 @@ def _has(package):
     return find_spec(package) is not None
 
 
-def test_trials_share_what_training_takes(street):
-    """And each is given what it computes on."""
+def test_trials_share_the_arguments_of_training(street):
+    """And each is given its device."""
     learning = _tune._learning("none", [street], "3", 0, None)
     assert learning == {"init": "none", "validation": [str(street)], "camera": "3", "device": "cpu"}
     for gpus, device, said in [(-1, None, "gpus_per_trial"), (0, "auto", "needs gpus_per_trial"), (1, "cpu", "idle")]:

@@ -1,4 +1,4 @@
-"""The Python that the two READMEs show, run as it stands there."""
+"""The Python code of the two READMEs, run as shown."""
 
 import re
 from pathlib import Path
@@ -22,7 +22,7 @@ def test_what_it_shows_runs(readme, tmp_path, monkeypatch):
     street = deepfusion.simulate("one-image", frames=1, seed=3, size=(1242, 375), scan_every=0)
     Image.fromarray(deepfusion.Dataset(street)[0].image).save("street.jpg")
     for shown in blocks(readme):
-        # A network is not trained whole here.
+        # The training is shortened here.
         short = shown.replace('train("tiny",', 'train({"preset": "tiny", "steps": 2, "batch": 2},')
         assert short != shown or "train(" not in shown
         names = {}

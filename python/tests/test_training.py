@@ -1,4 +1,4 @@
-"""Learning from a simulated street, seen from Python."""
+"""Training on a simulated street, through Python."""
 
 import os
 import shutil
@@ -24,7 +24,7 @@ def street(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def run(street, tmp_path_factory):
-    """A run, with what was reported of it."""
+    """A run and its events."""
     events = []
     folder = tmp_path_factory.mktemp("runs") / "run"
     run = deepfusion.train(SMALL, street, events.append, out=folder, init="none")
@@ -42,7 +42,7 @@ def test_a_run_is_trained_and_can_be_loaded(run, street):
     steps = [event for event in events if event["event"] == "step"]
     assert [event["step"] for event in steps] == [1, 2, 3]
     assert steps[-1]["losses"] == run.losses
-    # As the command's log.
+    # The same as the command's log.
     lines = (run.path / "log.csv").read_text().splitlines()
     columns = lines[0].split(",")
     last = dict(zip(columns, [line for line in lines if ",train," in line][-1].split(",")))
@@ -66,7 +66,7 @@ def test_the_same_seed_is_the_same_run(run, street, tmp_path):
     assert other.losses != run[0].losses
 
 
-def test_a_recordings_warnings_are_pythons(street, tmp_path):
+def test_a_recordings_warnings_are_python_warnings(street, tmp_path):
     """As the command prints them."""
     folder = tmp_path / "folder"
     frames = list(deepfusion.Dataset(street))
@@ -79,7 +79,7 @@ def test_a_recordings_warnings_are_pythons(street, tmp_path):
         deepfusion.train({**SMALL, "steps": 1}, folder, out=tmp_path / "run", init="none")
 
 
-def test_a_callback_stops_and_the_run_goes_on(run, street, tmp_path):
+def test_a_callback_stops_and_the_run_can_be_resumed(run, street, tmp_path):
     out = tmp_path / "stopped"
     stopped = deepfusion.train(
         SMALL, street, lambda e: not (e["event"] == "step" and e["step"] == 2), out=out, init="none"
@@ -87,7 +87,7 @@ def test_a_callback_stops_and_the_run_goes_on(run, street, tmp_path):
     assert stopped.stopped and stopped.step == 2
     finished = deepfusion.train(out=out, resume=True)
     assert finished.step == 3 and not finished.stopped
-    # As if it had never been interrupted.
+    # The result is as without the interruption.
     assert finished.losses["total"] == pytest.approx(run[0].losses["total"], rel=1e-5)
 
 
@@ -102,7 +102,7 @@ def test_what_a_callback_raises_is_raised(street, tmp_path):
     out = tmp_path / "raised"
     with pytest.raises(Mine, match="enough"):
         deepfusion.train(SMALL, street, listen, out=out, init="none")
-    assert deepfusion.load(out).step == 1, "and the run is saved"
+    assert deepfusion.load(out).step == 1, "the run is saved"
 
 
 def test_false_stops_whatever_the_event_is(street, tmp_path):
@@ -113,8 +113,8 @@ def test_false_stops_whatever_the_event_is(street, tmp_path):
     assert stopped.stopped and stopped.step == 3
 
 
-def test_a_run_goes_on_with_its_own_settings(run, street, tmp_path):
-    """As the command has it: a run may be made longer, and what contradicts it leaves it as it was."""
+def test_a_run_is_resumed_with_its_own_settings(run, street, tmp_path):
+    """As in the command: a run may be made longer; contradictions are errors that leave it unchanged."""
     out = tmp_path / "run"
     shutil.copytree(run[0].path, out)
     before = (out / "config.toml").read_text()
@@ -136,7 +136,7 @@ def test_a_run_goes_on_with_its_own_settings(run, street, tmp_path):
 
 
 def test_a_callback_may_predict(street, tmp_path):
-    """With a single thread as well: Ray gives each worker one."""
+    """Even with a single thread, as Ray gives each worker."""
     code = """
         import sys, deepfusion
         model, seen = deepfusion.load("tiny"), []
@@ -192,12 +192,12 @@ def test_wrong_configurations_say_what_is_wrong(run, street, tmp_path):
 
 
 def interrupted(code, when, *arguments):
-    """Runs a program and sends Ctrl-C once it has printed `when`; gives how it ended, and how long it took from there."""
+    """Runs a program and sends Ctrl-C once it has printed `when`; returns how it ended, and how long that took."""
     program = subprocess.Popen(
         [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)],
         stdout=subprocess.PIPE,
         text=True,
-        # What a shell starts in its background ignores Ctrl-C, and so would the program.
+        # Processes that a shell starts in the background ignore Ctrl-C, and the program would inherit that.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     for line in program.stdout:
@@ -244,7 +244,7 @@ def test_ctrl_c_ends_other_long_calls(street, tmp_path):
     """
     code, rest, seconds = interrupted(code, "begun", out)
     assert code == 0 and "interrupted" in rest and seconds < 60
-    assert not out.exists(), "nothing half is left"
+    assert not out.exists(), "no incomplete output is left"
     code = """
         import itertools, sys, deepfusion
         frame = deepfusion.Dataset(sys.argv[1])[0]
@@ -263,7 +263,7 @@ def test_ctrl_c_ends_other_long_calls(street, tmp_path):
 @pytest.mark.skipif(os.name != "posix", reason="makes a pipe, sends SIGINT")
 @pytest.mark.parametrize("call", ["Dataset", "load"])
 def test_ctrl_c_ends_what_reads_for_long(run, street, tmp_path, call):
-    """A file that never comes stands for a large recording, or weights on a slow disk."""
+    """A file that never arrives simulates a large recording, or weights on a slow disk."""
     if call == "Dataset":
         date = tmp_path / street.parent.name
         given = date / street.name

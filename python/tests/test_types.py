@@ -1,4 +1,4 @@
-"""The stubs are of the module that is there, and the package's own types agree."""
+"""The stubs match the native module, and the package's types are consistent."""
 
 import subprocess
 import sys
@@ -12,7 +12,7 @@ SETTINGS = Path(__file__).parents[1] / "pyproject.toml"
 
 
 def succeeds(folder, *words):
-    # Not from the sources' folder: what is installed is meant.
+    # Not from the sources' folder, so that the installed package is checked.
     done = subprocess.run([sys.executable, "-m", *map(str, words)], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 

@@ -1,4 +1,4 @@
-//! The devices that this build and this machine have, and the line that says which one computes.
+//! The devices of this build and this machine, and the line that names the one in use.
 
 pub(crate) use deepfusion_jobs::devices::{Backend, ComputeDevice, NoDevice, megabytes};
 #[cfg(feature = "train")]
@@ -7,16 +7,16 @@ use deepfusion_train::Device;
 #[cfg(feature = "train")]
 use crate::progress::say;
 
-/// Opens a device, and says which it is where it is not the processor.
+/// Opens a device, and prints its name unless it is the processor.
 ///
 /// # Errors
 /// As [`deepfusion_jobs::devices::open`].
 #[cfg(feature = "train")]
 pub(crate) fn open(device: ComputeDevice) -> deepfusion_jobs::Result<Device> {
     let opened = deepfusion_jobs::devices::open(device)?;
-    // Whoever said `auto` hears what it came to.
+    // So that users of `auto` see which device was chosen.
     if device.backend != Backend::Cpu {
-        say(&format!("computes on {device}"));
+        say(&format!("computing on {device}"));
     }
     Ok(opened)
 }

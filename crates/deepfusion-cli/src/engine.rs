@@ -1,4 +1,4 @@
-//! What runs a trained network: the choice made on the command line.
+//! The engine that runs a trained network, as chosen on the command line.
 
 use deepfusion_jobs::engine::Engine;
 use deepfusion_model::weights::Weights;
@@ -21,7 +21,7 @@ pub(crate) fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstima
     })?)
 }
 
-/// The engine asked for, with a network of this configuration and these weights, and what it was calibrated to.
+/// The engine asked for, with a network of this configuration, these weights and this calibration.
 pub(crate) fn runner(
     args: &EngineArgs,
     config: &TrainConfig,
@@ -32,7 +32,7 @@ pub(crate) fn runner(
     let engine = settings.chosen()?;
     if engine == Engine::Burn {
         allocator::keep_memory();
-        // Says which device it is before the network is built there.
+        // Prints the device's name before the network is built on it.
         #[cfg(feature = "train")]
         devices::open(args.device)?;
     }

@@ -19,54 +19,54 @@ pub(crate) enum CliError {
         /// The option that allows it, or what else to do.
         hint: &'static str,
     },
-    /// A device that computes something else than the processor.
+    /// A device whose results differ from the processor's.
     #[cfg(feature = "train")]
     #[error(
-        "{wrong} of {} on `{device}` {} not what the processor computes",
+        "{wrong} of {} on `{device}` {} the processor's results",
         count_of(*of, "operation"),
-        if *wrong == 1 { "is" } else { "are" }
+        if *wrong == 1 { "does not match" } else { "do not match" }
     )]
     DeviceDiffers {
         /// The device.
         device: String,
         /// How many operations differ or failed.
         wrong: usize,
-        /// Of how many.
+        /// How many operations were compared.
         of: usize,
-        /// What to do without.
+        /// What to do instead.
         hint: String,
     },
-    /// A file of a viewer that was not compiled in.
+    /// A file for the rerun viewer, in a build without it.
     #[cfg(not(feature = "rerun"))]
     #[error("this build writes no files for the rerun viewer")]
     NoRerun,
-    /// A text that cannot be a moment on a log's clock.
-    #[error("--start {word}: not a moment on the log's clock")]
+    /// A text that is not a time on the log's clock.
+    #[error("--start {word}: not a time on the log's clock")]
     NotOnClock {
         /// What was given.
         word: String,
     },
-    /// An option of `doctor` that says nothing of what is looked at.
+    /// An option of `doctor` that does not apply to its input.
     #[error("{}: {option} does not apply to {}", path.display(), if *is_log { "a log of speeds by itself" } else { "a recording" })]
     OutOfPlace {
-        /// What is looked at.
+        /// The input.
         path: PathBuf,
         /// The option.
         option: &'static str,
-        /// Whether it is a log of speeds by itself.
+        /// Whether the input is a log of speeds by itself.
         is_log: bool,
     },
-    /// An option that says nothing of the layout to be written.
-    #[error("{option} is not for this layout: {why}")]
+    /// An option that does not apply to the layout to be written.
+    #[error("{option} does not apply to this layout: {why}")]
     OtherLayout {
         /// The option.
         option: &'static str,
         /// Why not.
         why: &'static str,
-        /// The layout that it is for.
+        /// The layout that it applies to.
         layout: &'static str,
     },
-    /// What a varied drive, or one that is not, cannot have.
+    /// An option of `simulate` that a varied drive, or any other one, cannot have.
     #[error("{given}: {why}")]
     Varied {
         /// The option, as it was given.
@@ -74,11 +74,11 @@ pub(crate) enum CliError {
         /// Why not.
         why: VariedConflict,
     },
-    /// A log without anything that saw the drive.
-    #[error("neither a video nor images are given for the log")]
+    /// A log to import without images of the drive.
+    #[error("no video and no images are given for the log")]
     NoMedia,
     /// No network named, and none embedded.
-    #[error("no `--model` is given, and this build has no embedded network to take instead")]
+    #[error("no `--model` is given, and this build has no embedded network to use instead")]
     NoModelGiven,
     /// Something that only the training framework can do, in a build without it.
     #[cfg_attr(
@@ -90,36 +90,36 @@ pub(crate) enum CliError {
         /// What was asked for.
         what: &'static str,
     },
-    /// Something that is kept in a run's folder, of a network that has none.
-    #[error("{option}: `{model}` has no run's folder to keep it in")]
+    /// An option that writes into a run's folder, for a network without one.
+    #[error("{option}: `{model}` has no run folder to write to")]
     NoRunFolder {
-        /// What was asked for.
+        /// The option.
         option: &'static str,
         /// The network's name.
         model: String,
     },
-    /// Poses of a network for depth alone.
-    #[error("`{model}` is a depth network alone: it has no pose network")]
+    /// Poses asked of a network that predicts only depth.
+    #[error("`{model}` predicts only depth: it has no pose network")]
     NoPoseNet {
-        /// Its name.
+        /// The network's name.
         model: String,
     },
     /// A file where a run's folder is needed.
-    #[error("{}: pictures need a run's folder, and this is a file", path.display())]
+    #[error("{}: expected a run's folder for the pictures, found a file", path.display())]
     NoModel {
         /// The file.
         path: PathBuf,
     },
     /// Several drives where one is needed.
-    #[error("{}: holds {drives} drives, and a bag holds one", input.display())]
+    #[error("{}: contains {drives} drives, but a bag holds one", input.display())]
     SeveralDrives {
         /// What was given.
         input: PathBuf,
-        /// How many it holds.
+        /// How many drives it contains.
         drives: usize,
     },
     /// A ROS 2 bag asked for.
-    #[error("{}: bags of ROS 2 are read, not written", path.display())]
+    #[error("{}: ROS 2 bags can be read, but not written", path.display())]
     NoRos2Writer {
         /// The output's name.
         path: PathBuf,
@@ -129,15 +129,15 @@ pub(crate) enum CliError {
     Unreadable {
         /// What was given.
         path: PathBuf,
-        /// How many of them cannot.
+        /// How many of the recordings cannot be read.
         unreadable: usize,
-        /// How many there are.
+        /// How many recordings there are.
         recordings: usize,
-        /// What to do about the first.
+        /// What to do about the first that cannot be read.
         hint: Option<String>,
     },
     /// A recording that should not be trained on.
-    #[error("{}: {errors} {} would make training fail or give a wrong scale", path.display(), if *errors == 1 { "error" } else { "errors" })]
+    #[error("{}: {} would make training fail or give a wrong scale", path.display(), count_of(*errors, "error"))]
     Unfit {
         /// The recording.
         path: PathBuf,
@@ -147,31 +147,31 @@ pub(crate) enum CliError {
     /// Images that could not be predicted, while others could.
     #[error("{}", some_failed(failures, *total, *interrupted))]
     SomeFailed {
-        /// What each of them failed for.
+        /// Why each image failed.
         failures: Vec<String>,
         /// How many images there were in all.
         total: usize,
         /// Whether the run was stopped before the others were done.
         interrupted: bool,
-        /// Whether the same command goes on with what is missing.
+        /// Whether the same command continues with the missing images.
         resumes: bool,
-        /// The first hint that one of the failures has.
+        /// The first hint among the failures.
         hint: Option<String>,
     },
-    /// Nothing but what was written there before.
-    #[error("{input}: no image but outputs of this program")]
+    /// A folder whose only images were written by this program.
+    #[error("{input}: contains no images other than outputs of this program")]
     OutputsAlone {
         /// What was given.
         input: String,
     },
-    /// Tables that would be written into the file of the pictures beside them.
-    #[error("{}: the file of the pictures beside the tables, which are asked for under the same name", path.display())]
+    /// Tables that would overwrite the pictures beside them.
+    #[error("{}: the tables and the pictures would be written to this same file", path.display())]
     TablesInPicture {
         /// The file.
         path: PathBuf,
     },
-    /// Outputs were to go into a file.
-    #[error("{}: a file, and a folder is to be written there", path.display())]
+    /// A file where the folder for the outputs should be.
+    #[error("{}: expected a folder for the outputs, found a file", path.display())]
     NotAFolder {
         /// The file.
         path: PathBuf,
@@ -183,7 +183,7 @@ pub(crate) enum CliError {
         done: usize,
         /// Images in all.
         total: usize,
-        /// Whether the same command goes on with what is missing.
+        /// Whether the same command continues with the missing images.
         resumes: bool,
     },
     /// Training that was stopped, and saved.
@@ -193,76 +193,74 @@ pub(crate) enum CliError {
         step: usize,
         /// Steps of the whole run.
         steps: usize,
-        /// The command that goes on with it.
+        /// The command that continues the run.
         go_on: String,
     },
-    /// A recording of a resumed run that is not where it was.
-    #[error("{}: no such file or folder, and {} learns from it", path.display(), run.display())]
+    /// A recording of a resumed run that is no longer where it was.
+    #[error("{}: no such file or folder, but {} trains on it", path.display(), run.display())]
     Moved {
         /// The recording.
         path: PathBuf,
         /// The run's folder.
         run: PathBuf,
-        /// The option that says where it is now; none for a data set's.
+        /// The option that gives its new path; none for a recording of `[[data.sets]]`.
         option: Option<String>,
     },
-    /// An adapted network that is worse than the one it began from.
+    /// An adapted network that is worse than the one it started from.
     #[cfg(feature = "train")]
-    #[error("not kept: on the frames that are held out it became worse: {worse}; moved to {}", path.display())]
+    #[error("not kept: it is worse on the held-out frames: {worse}; moved to {}", path.display())]
     Refused {
-        /// Where it lies.
+        /// The folder it was moved to.
         path: PathBuf,
-        /// In what.
+        /// Which metrics became worse.
         worse: String,
     },
-    /// An adapted network that cannot be compared with the one it began from.
+    /// An adapted network that cannot be compared with the one it started from.
     #[cfg(feature = "train")]
     #[error("not kept: {}; moved to {}", deepfusion_jobs::training::adaptation::Refusal::NotJudged, path.display())]
     NothingJudged {
-        /// Where it lies.
+        /// The folder it was moved to.
         path: PathBuf,
     },
-    /// Work that was stopped and has nothing to go on with.
+    /// Work that was stopped and cannot be continued.
     #[error("{what} was stopped before it was done")]
     Ended {
         /// The work.
         what: &'static str,
     },
     /// A live source beside other inputs.
-    #[error("{address}: a live source is looked at alone, without other inputs")]
+    #[error("{address}: a live source cannot be combined with other inputs")]
     LiveAlone {
         /// The source.
         address: String,
     },
-    /// Standard input asked for, and nobody pipes anything.
+    /// Standard input asked for, while it is a terminal.
     #[error("standard input is a terminal: no stream is piped in")]
     Terminal,
-    /// A part of a live source.
+    /// A shard of a live source.
     #[error("a live source cannot be split into shards: its number of frames is not known")]
     LiveShard,
     /// An option of live sources for files.
-    #[error("`{option}` is for live sources, and these inputs are files")]
+    #[error("`{option}` is for live sources, but these inputs are files")]
     OnlyLive {
         /// The option.
         option: &'static str,
     },
-    /// An option of the scale monitor where nothing can be watched.
-    #[error("{input}: {why}, and `{option}` needs both speed and yaw rate")]
+    /// An option of the scale monitor for an input that lacks speed or yaw rate.
+    #[error("{input}: {why}, but `{option}` needs both speed and yaw rate")]
     Unwatched {
         /// The option.
         option: &'static str,
-        /// The first input that cannot be watched.
+        /// The first input that cannot be monitored.
         input: String,
         /// Why not.
         why: String,
     },
-    /// A correction that follows the frames, of which this run sees a part.
-    #[error("`--correct-scale` follows all frames of a recording, and a shard sees only some")]
+    /// A correction that needs all frames of a recording, in a shard.
+    #[error("`--correct-scale` needs all frames of a recording, but a shard has only some")]
     CorrectShard,
-    /// A video of every other frame.
-    #[error(
-        "`--save video` shows the frames of a recording one after the other, and a shard sees only some"
-    )]
+    /// A video of all frames of a recording, in a shard.
+    #[error("`--save video` needs all frames of a recording, but a shard has only some")]
     VideoShard,
 }
 
@@ -270,7 +268,7 @@ impl Reportable for CliError {
     fn exit(&self) -> Exit {
         match self {
             Self::Interrupted { .. } | Self::Stopped { .. } | Self::Ended { .. } => Exit::Stopped,
-            // Clap could not see it: what is needed depends on what is embedded, what applies on what lies at the path.
+            // Clap cannot check these: they depend on the embedded networks and on the contents of the given path.
             Self::NoModelGiven
             | Self::OutOfPlace { .. }
             | Self::OtherLayout { .. }
@@ -295,31 +293,31 @@ impl Reportable for CliError {
                 "use a program built with the feature `train`, which is on by default".into(),
             ),
             Self::NoRunFolder { .. } => Some(
-                "train on from it (deepfusion train --data DRIVE --init NAME), and give that run's folder".into(),
+                "train from it first (deepfusion train --data DRIVE --init NAME), then give that run's folder".into(),
             ),
             Self::NoPoseNet { .. } => Some("give the folder of a run that `train` wrote".into()),
-            Self::NoModel { .. } => Some("give run folders alone, or leave out --pictures".into()),
-            Self::SeveralDrives { .. } => Some("convert them one by one: give a drive's own folder".into()),
+            Self::NoModel { .. } => Some("give only run folders, or leave out --pictures".into()),
+            Self::SeveralDrives { .. } => Some("convert them one by one: give the folder of one drive".into()),
             Self::NoRos2Writer { .. } => {
                 Some("give a name that ends in .bag for a ROS 1 bag, or another folder for KITTI raw".into())
             }
             Self::SomeFailed { hint, resumes, .. } => Some(match hint {
                 Some(hint) => format!("{hint}; then {}", again(*resumes)),
-                None => format!("mend them, then {}", again(*resumes)),
+                None => format!("fix them, then {}", again(*resumes)),
             }),
-            Self::Unfit { .. } => Some("each finding above has its hint; --verbose prints every figure".into()),
+            Self::Unfit { .. } => Some("follow the hints above; --verbose prints every measurement".into()),
             Self::Unreadable { unreadable, recordings, hint, .. } => Some(format!(
                 "each is listed with its reason; {}{}",
-                hint.as_deref().unwrap_or("mend them"),
-                if unreadable < recordings { ", or give the others by themselves" } else { "" }
+                hint.as_deref().unwrap_or("fix them"),
+                if unreadable < recordings { ", or give only the others" } else { "" }
             )),
-            Self::OutputsAlone { .. } => Some("give the images that they were made of".into()),
-            Self::TablesInPicture { .. } => Some("give --out another ending, as .html or .txt".into()),
-            Self::NotAFolder { .. } => Some("give --out a folder, which is made where it is not there".into()),
+            Self::OutputsAlone { .. } => Some("give the images that they were made from".into()),
+            Self::TablesInPicture { .. } => Some("give --out another ending, such as .html or .txt".into()),
+            Self::NotAFolder { .. } => Some("give --out a folder; it is created if it does not exist".into()),
             Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),
-            Self::Stopped { go_on, .. } => Some(format!("go on with: {go_on}")),
+            Self::Stopped { go_on, .. } => Some(format!("continue with: {go_on}")),
             Self::Moved { option: Some(option), .. } => Some(format!(
-                "if it was moved, say where it is now: {option} PATH; if its disk is not mounted, mount it"
+                "if it was moved, give its new path: {option} PATH; if its disk is not mounted, mount it"
             )),
             Self::Moved { run, option: None, .. } => Some(format!(
                 "if it was moved, correct its path in {}",
@@ -327,30 +325,32 @@ impl Reportable for CliError {
             )),
             #[cfg(feature = "train")]
             Self::Refused { .. } => Some(
-                "the given network is the better one here; more drives, fewer --steps or a smaller --learning-rate may change that".into(),
+                "keep using the given network, or try more drives, fewer --steps or a smaller --learning-rate".into(),
             ),
             #[cfg(feature = "train")]
             Self::NothingJudged { .. } => Some(
-                "give longer drives with a speed, or more of them with --held-out SHARE; fewer --steps or a smaller --learning-rate change less".into(),
+                "give longer drives with a speed, hold out more with --held-out SHARE, or change the network less with fewer --steps or a smaller \
+                 --learning-rate"
+                    .into(),
             ),
             Self::Ended { .. } => Some("start it again, into another folder".into()),
-            Self::LiveAlone { .. } => Some("start one run for each source, each with a folder of its own".into()),
-            Self::Terminal => Some("… | deepfusion … -, or give a camera or an address instead of -".into()),
+            Self::LiveAlone { .. } => Some("start one run for each source, each with its own folder".into()),
+            Self::Terminal => Some("pipe a stream in (… | deepfusion … -), or give a camera or an address instead of -".into()),
             Self::LiveShard => Some("leave --shard out".into()),
             Self::OnlyLive { .. } => {
                 Some("leave it out, or give camera:0, an address such as rtsp://…, or - for standard input".into())
             }
             Self::Unwatched { .. } => Some("leave it out, or give recordings with speed and yaw rate alone".into()),
-            Self::CorrectShard => Some("leave --shard out: give each run recordings of its own".into()),
+            Self::CorrectShard => Some("leave out --shard, and give each run its own recordings".into()),
             Self::VideoShard => {
                 Some("save side-by-side in the shards, then run once more with --save video and without --shard".into())
             }
-            Self::NotOnClock { .. } => Some("give seconds, a time of day or a date, as the log has them".into()),
+            Self::NotOnClock { .. } => Some("give seconds, a time of day or a date, as in the log".into()),
             Self::OutOfPlace { is_log: true, .. } => Some(
-                "leave it out; a log by itself takes --time, --speed, --unit and --dbc, and becomes a recording by deepfusion data import".into(),
+                "leave it out; a log by itself takes --time, --speed, --unit and --dbc, and deepfusion data import makes a recording of it".into(),
             ),
             Self::OutOfPlace { .. } => Some(
-                "leave it out; the columns of a recording's own log stand in its dataset.toml (time_column, speed_column, speed_unit, dbc)".into(),
+                "leave it out; a recording's dataset.toml describes its log (time_column, speed_column, speed_unit, dbc)".into(),
             ),
             Self::OtherLayout { layout, .. } => Some(format!("leave it out, or give --format {layout}")),
             Self::Varied { why, .. } => Some(
@@ -367,7 +367,7 @@ impl Reportable for CliError {
     }
 }
 
-/// The failures of a run, a line each, as many as a person reads; the manifest has them all.
+/// The failures of a run, one per line, up to a readable number; the manifest has them all.
 fn some_failed(failures: &[String], total: usize, interrupted: bool) -> String {
     const SHOWN: usize = 20;
     let mut text = format!("{} of {} failed", failures.len(), count_of(total, "image"));
@@ -388,7 +388,7 @@ fn some_failed(failures: &[String], total: usize, interrupted: bool) -> String {
     text
 }
 
-/// Different texts in their order, each with how often it is there: what is wrong with a video is so for each of its frames.
+/// The distinct texts in order of appearance, each with its count: a fault of a video is reported once for each of its frames.
 fn counted(texts: &[String]) -> Vec<(&str, usize)> {
     let mut different = Vec::new();
     let mut places = HashMap::new();
@@ -402,12 +402,12 @@ fn counted(texts: &[String]) -> Vec<(&str, usize)> {
     different
 }
 
-/// How a bulk run is gone on with.
+/// How to continue a bulk run.
 fn again(resumes: bool) -> &'static str {
     if resumes {
-        "run the same again: finished images are kept"
+        "run the same command again: finished images are kept"
     } else {
-        "run it anew with --overwrite: targets are followed from the first image on"
+        "run it again with --overwrite: targets are tracked from the first image on"
     }
 }
 
@@ -416,24 +416,24 @@ mod tests {
     use super::CliError;
 
     #[test]
-    fn what_many_images_failed_for_is_said_once() {
+    fn a_reason_shared_by_many_images_is_printed_once() {
         let failures: Vec<String> = ["a.mp4.frames: refused", "b.png: no image"]
             .into_iter()
             .chain(["a.mp4.frames: refused"; 30])
             .map(str::to_owned)
             .collect();
-        let said = super::some_failed(&failures, 40, false);
+        let text = super::some_failed(&failures, 40, false);
         let expected =
             "32 of 40 images failed\n  a.mp4.frames: refused (31 times)\n  b.png: no image";
-        assert_eq!(said, expected);
+        assert_eq!(text, expected);
         let different: Vec<String> = (0..22).map(|i| format!("{i}.png: no image")).collect();
-        let said = super::some_failed(&different, 40, false);
-        assert!(said.ends_with("and 2 more, in the manifest"), "{said}");
+        let text = super::some_failed(&different, 40, false);
+        assert!(text.ends_with("and 2 more, in the manifest"), "{text}");
     }
 
     #[test]
-    fn one_image_is_no_plural() {
-        let said = |done, total| {
+    fn one_image_is_singular() {
+        let message = |done, total| {
             let resumes = true;
             let stopped = CliError::Interrupted {
                 done,
@@ -442,14 +442,14 @@ mod tests {
             };
             stopped.to_string()
         };
-        assert_eq!(said(0, 1), "stopped: 0 of 1 image is done");
-        assert_eq!(said(1, 5), "stopped: 1 of 5 images is done");
-        assert_eq!(said(2, 5), "stopped: 2 of 5 images are done");
+        assert_eq!(message(0, 1), "stopped: 0 of 1 image is done");
+        assert_eq!(message(1, 5), "stopped: 1 of 5 images is done");
+        assert_eq!(message(2, 5), "stopped: 2 of 5 images are done");
     }
 
     #[cfg(feature = "train")]
     #[test]
-    fn what_cannot_be_judged_is_not_called_worse() {
+    fn a_network_that_cannot_be_judged_is_not_called_worse() {
         let path = "mine.refused".into();
         assert_eq!(
             CliError::NothingJudged { path }.to_string(),

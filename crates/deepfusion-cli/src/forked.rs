@@ -1,4 +1,4 @@
-//! Rayon in the child of a fork: of its parent's threads none came along, and what is handed to their pool would be waited for for ever.
+//! Rayon in the child of a fork. The child has none of its parent's threads, so work given to the parent's pool would never be done.
 
 use std::process;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -10,17 +10,17 @@ use super::STACK_BYTES;
 /// The process that loaded this library.
 static LOADED_BY: OnceLock<u32> = OnceLock::new();
 
-/// The pools of children, each with its process. That of a parent is kept and never ended: its threads are not there.
+/// The pools of children, each with its process id. A parent's pool is kept and never dropped: its threads do not exist here.
 static POOLS: Mutex<Vec<(u32, Arc<ThreadPool>)>> = Mutex::new(Vec::new());
 
-/// Remembers this process as the one whose rayon threads are its own; a later call changes nothing. For libraries in a process that may
-/// be forked, when they are loaded.
+/// Remembers this process as the owner of rayon's threads; later calls change nothing. To be called when the library is loaded into a
+/// process that may be forked.
 pub fn loaded_here() {
     LOADED_BY.get_or_init(process::id);
 }
 
-/// Does `work` where its parallel parts have threads: here, and in the child of a fork ([`loaded_here`]) in a pool that is made for that
-/// process once.
+/// Does `work` where its parallel parts have threads: here, or, in the child of a fork ([`loaded_here`]), in a pool that is made once
+/// for that process.
 pub fn in_this_process<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     match pool() {
         Some(pool) => pool.install(work),
@@ -28,7 +28,7 @@ pub fn in_this_process<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     }
 }
 
-/// The pool of this process, where it is the child of a fork; `None` where rayon's common one is there, or no pool can be made.
+/// The pool of this process if it is the child of a fork; `None` if it has rayon's common pool, or no pool can be made.
 pub(super) fn pool() -> Option<Arc<ThreadPool>> {
     let (loaded_by, here) = (*LOADED_BY.get()?, process::id());
     if here == loaded_by {

@@ -1,5 +1,5 @@
-//! Ctrl-C, and what schedulers and closed terminals send (SIGTERM, SIGHUP): the first asks the work to stop where nothing is
-//! lost, a second one ends the program at once.
+//! Ctrl-C, and the signals that schedulers and closed terminals send (SIGTERM, SIGHUP): the first asks the work to stop where nothing
+//! is lost, the second ends the program at once.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -11,7 +11,7 @@ use crate::failure::{Result, STOPPED};
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 
-/// From now on these signals set [`asked`] and say `notice`; the first call's stands.
+/// From now on these signals set [`asked`] and print `notice`. Only the first call has an effect.
 pub(crate) fn catch(notice: &'static str) {
     static SET: OnceLock<()> = OnceLock::new();
     SET.get_or_init(|| {
@@ -20,8 +20,8 @@ pub(crate) fn catch(notice: &'static str) {
                 if ASKED.swap(true, Ordering::SeqCst) {
                     std::process::exit(i32::from(STOPPED));
                 }
-                // After a hangup nobody may be left to read it.
-                let _ = writeln!(std::io::stderr(), "{notice} (Ctrl-C again: at once)");
+                // After a hangup stderr may be closed.
+                let _ = writeln!(std::io::stderr(), "{notice} (Ctrl-C again to stop at once)");
             })
         });
         if let Err(error) = caught {
@@ -35,7 +35,7 @@ pub(crate) fn asked() -> bool {
     ASKED.load(Ordering::SeqCst)
 }
 
-/// [`asked`], for work that hears of it from its listener.
+/// [`asked`], for work whose progress callback returns it.
 pub(crate) fn flow() -> ControlFlow<()> {
     if asked() {
         ControlFlow::Break(())
@@ -44,7 +44,7 @@ pub(crate) fn flow() -> ControlFlow<()> {
     }
 }
 
-/// Ends what cannot be gone on with, where the work was asked to stop.
+/// Fails if the work was asked to stop; for work that cannot be continued later.
 pub(crate) fn check(what: &'static str) -> Result<()> {
     if asked() {
         Err(CliError::Ended { what }.into())
@@ -53,15 +53,15 @@ pub(crate) fn check(what: &'static str) -> Result<()> {
     }
 }
 
-/// Sets handlers, and ignores hangups again where they were ignored before: `nohup` is to go on when the terminal closes.
+/// Sets handlers, but keeps ignoring hangups if they were ignored before: under `nohup` work continues after the terminal closes.
 #[cfg(unix)]
 fn leaving_an_ignored_hangup<T>(set: impl FnOnce() -> T) -> T {
     use nix::sys::signal::{SigHandler, Signal, signal};
     let hangups = |handler| {
-        // SAFETY: neither of the two handlers given here is code of ours that a signal could run at a bad time.
+        // SAFETY: neither of the two handlers given here is our own code, which a signal could run at a bad time.
         unsafe { signal(Signal::SIGHUP, handler) }
     };
-    // There is no asking without setting. What was there before is no handler of this program: this runs once, first.
+    // A handler can only be queried by setting another. The previous one is not this program's: this runs once, before any is set.
     let ignored = matches!(hangups(SigHandler::SigIgn), Ok(SigHandler::SigIgn));
     if !ignored {
         let _ = hangups(SigHandler::SigDfl);
@@ -73,7 +73,7 @@ fn leaving_an_ignored_hangup<T>(set: impl FnOnce() -> T) -> T {
     outcome
 }
 
-/// Elsewhere a hangup cannot be ignored.
+/// Other systems have no hangups to ignore.
 #[cfg(not(unix))]
 fn leaving_an_ignored_hangup<T>(set: impl FnOnce() -> T) -> T {
     set()

@@ -5,7 +5,7 @@
     allow(
         dead_code,
         unused_imports,
-        reason = "a build without training leaves out commands, not what they share"
+        reason = "a build without training leaves out commands, but not the code that they share"
     )
 )]
 
@@ -32,11 +32,11 @@ pub use allocator::keep_memory;
 pub use failure::in_options;
 pub use forked::{in_this_process, loaded_here};
 
-/// The command line that is run, for reports: in Python the process has another one.
+/// The command line that is run, for reports. In Python it differs from the process's own.
 static ARGUMENTS: OnceLock<Vec<OsString>> = OnceLock::new();
 
 /// Runs a command line, the program's name first, as the program would: data on stdout, warnings and progress on stderr. Commands that
-/// can be interrupted take over Ctrl-C. It is meant to be all that its process does.
+/// can be interrupted take over Ctrl-C. Meant for a process that does nothing else.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     static LOGGING: Once = Once::new();
     LOGGING.call_once(output::init_logging);
@@ -45,9 +45,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     ARGUMENTS.get_or_init(|| arguments);
     let cli = match parsed {
         Ok(cli) => cli,
-        // Wrong arguments end here, as help does: clap says which, suggests the near one and gives 2.
+        // Wrong arguments end here, as help does: clap names them, suggests similar ones and returns exit code 2.
         Err(answer) => {
-            // Where it cannot be printed, nobody reads it.
+            // If stderr is closed, the exit code still reports it.
             let _ = answer.print();
             let code = u8::try_from(answer.exit_code());
             return code.map_or(ExitCode::FAILURE, ExitCode::from);
@@ -60,12 +60,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// As large as the main thread's: the graph of a backward pass is deep.
+/// As large as the main thread's stack: the graph of a backward pass is deep.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Runs `work` on one of rayon's threads: its parallel operations then start at once, where the main
-/// thread would hand each of them over and sleep. A training step has a great many of them. In the child of a fork it is a thread of that
-/// process's own pool ([`in_this_process`]).
+/// Runs `work` on one of rayon's threads. Its parallel operations, of which a training step has very many, then start at once; the main
+/// thread would hand each of them over and sleep. In the child of a fork it is a thread of that process's own pool ([`in_this_process`]).
 pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     if let Some(pool) = forked::pool() {
         return pool.install(work);
@@ -76,7 +75,7 @@ pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     rayon::scope(|_| work())
 }
 
-/// As [`in_pool`], on the threads of a pool that nothing else uses and that ends with `work`; in the common one where there can be no other.
+/// As [`in_pool`], on the threads of a pool that nothing else uses and that ends with `work`. If no such pool can be made, in the common one.
 pub fn in_own_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     match rayon::ThreadPoolBuilder::new()
         .stack_size(STACK_BYTES)
@@ -87,7 +86,7 @@ pub fn in_own_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     }
 }
 
-/// The words after the program's name.
+/// The arguments after the program's name.
 fn arguments() -> impl Iterator<Item = String> {
     let all = ARGUMENTS.get().map_or(&[][..], Vec::as_slice);
     all.iter()

@@ -1,4 +1,4 @@
-//! Which trained network is meant: `--model`, or the one that the program carries.
+//! Which trained network to use: the one of `--model`, or the embedded one.
 
 use std::path::Path;
 
@@ -11,10 +11,10 @@ use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::say;
 
-/// What `--model` says; without it the network that the program carries, which is printed.
+/// The network of `--model`; without it the embedded default, whose name is printed.
 ///
 /// # Errors
-/// As [`ModelSource::named`]; [`CliError::NoModelGiven`] without `--model` where no network is embedded.
+/// As [`ModelSource::named`]; [`CliError::NoModelGiven`] without `--model` if no network is embedded.
 pub(crate) fn chosen(asked: Option<&Path>) -> Result<ModelSource> {
     match asked {
         Some(model) => named(model),
@@ -22,28 +22,28 @@ pub(crate) fn chosen(asked: Option<&Path>) -> Result<ModelSource> {
     }
 }
 
-/// The network of a path or a name; warns where that could mean an embedded network as well as the run that is taken.
+/// The network of a path or a name; warns if a run hides an embedded network of that name.
 ///
 /// # Errors
 /// As [`ModelSource::named`].
 pub(crate) fn named(model: &Path) -> Result<ModelSource> {
     warn_of_hidden(model);
     let source = ModelSource::named(model)?;
-    // What cannot be read is an error of whoever needs it.
+    // An unreadable calibration is an error only for code that needs it.
     for stale in source.stale_calibrations().unwrap_or_default() {
         tracing::warn!("{stale}");
     }
     Ok(source)
 }
 
-/// Warns where a name could mean an embedded network as well as the run that is taken.
+/// Warns if a run hides an embedded network of that name.
 pub(crate) fn warn_of_hidden(model: &Path) {
     if let Some(hidden) = hidden_by_run(model) {
         tracing::warn!("{hidden}");
     }
 }
 
-/// The network that is meant without `--model`, which is printed; none where this build has none.
+/// The network that is used without `--model`, whose name is printed; none if this build embeds none.
 ///
 /// # Errors
 /// As [`ModelSource::embedded_default`].
@@ -51,14 +51,14 @@ pub(crate) fn embedded_default() -> Result<Option<ModelSource>> {
     let source = ModelSource::embedded_default()?;
     if let Some(ModelSource::Packed { network, .. }) = &source {
         say(&format!(
-            "no --model: the embedded network `{}` of {} is used",
+            "no --model given: using the embedded network `{}` of {}",
             network.card.name, network.card.date
         ));
     }
     Ok(source)
 }
 
-/// Warns where several input sizes are asked of a run that learned at one: it may then be worse than by one prediction.
+/// Warns if several input sizes are asked of a run that was trained at one: the result may then be worse than a single prediction.
 pub(crate) fn warn_of_one_size(
     model: &ModelSource,
     config: &TrainConfig,
@@ -72,7 +72,7 @@ pub(crate) fn warn_of_one_size(
     let at_one = learned.sizes.is_empty() && learned.video_sizes.is_empty();
     if several && model.folder().is_some() && at_one {
         tracing::warn!(
-            "--post-process {}: the run learned at {}x{} alone, and may be worse at other sizes; `eval` with and without it says",
+            "--post-process {}: the run was trained only at {}x{} and may be worse at other sizes; compare `eval` with and without it",
             how.map_or("", PostProcess::name),
             config.size.width,
             config.size.height

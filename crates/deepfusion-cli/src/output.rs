@@ -15,18 +15,18 @@ pub(crate) fn init_logging() {
         .with_writer(std::io::stderr)
         .with_ansi(colours_on_stderr())
         .without_time()
-        // Else a warning that nobody can read any more ends the program.
+        // Otherwise a warning on a closed stderr would end the program.
         .log_internal_errors(false)
         .with_target(false)
         .init();
 }
 
-/// Whether stderr is a terminal that wants colours (`NO_COLOR` is honoured).
+/// Whether stderr is a terminal that shows colours (`NO_COLOR` is honoured).
 fn colours_on_stderr() -> bool {
     anstream::AutoStream::choice(&std::io::stderr()) != anstream::ColorChoice::Never
 }
 
-/// Prints data on stdout. A reader that has gone away (`… | head`) is no failure.
+/// Prints data on stdout. It is no failure if the reader has closed the pipe (`… | head`).
 pub(crate) fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -50,7 +50,7 @@ pub(crate) fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
     Ok(written.map_err(|e| deepfusion_data::Error::file(path, e))?)
 }
 
-/// Makes a folder for outputs, where it is not there.
+/// Creates a folder for outputs if it does not exist.
 pub(crate) fn make_folder(folder: &Path) -> Result<()> {
     if folder.is_file() {
         let path = folder.to_owned();
@@ -60,8 +60,8 @@ pub(crate) fn make_folder(folder: &Path) -> Result<()> {
     Ok(std::fs::create_dir_all(folder).map_err(failed)?)
 }
 
-/// The folder a command writes to: the one asked for, or a new `runs/<command>-<time>`. It is made; a folder that holds
-/// something already is refused.
+/// The folder a command writes to: the one asked for, or a new `runs/<command>-<time>`. It is created; a folder that is not empty
+/// is refused.
 pub(crate) fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf> {
     let Some(folder) = asked else {
         return new_run_folder(Path::new("runs"), command);
@@ -79,25 +79,25 @@ pub(crate) fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf>
     Ok(folder)
 }
 
-/// Fails where a run could not be written to the folder asked for: an error before long work, not after it. Where there was no such folder there is none
-/// afterwards.
+/// Fails if a run could not be written to the folder asked for: an error before long work, not after it. Leaves no folder that did not
+/// exist before.
 #[cfg(feature = "train")]
 pub(crate) fn require_run_folder(asked: &Path) -> Result<()> {
     let made = !asked.exists();
     let folder = run_folder(Some(asked), "")?;
     let probe = deepfusion_fs::Partial::beside(&folder.join("config.toml"));
     let written = probe.create();
-    // Before the folder, which is then empty again.
+    // Removes the probe, so that the folder is empty again.
     drop(probe);
     if made {
-        // The run makes it anew, and whatever prevents that is said then.
+        // The run creates it again, and reports then what prevents that.
         let _ = std::fs::remove_dir(&folder);
     }
     written.map_err(|e| deepfusion_data::Error::file(&folder, e))?;
     Ok(())
 }
 
-/// A new folder by the command and the time, which of two commands that start at once each has for itself.
+/// A new folder named by the command and the time. Two commands that start at once get different folders.
 fn new_run_folder(runs: &Path, command: &str) -> Result<PathBuf> {
     make_folder(runs)?;
     let folder = runs.join(format!("{command}-{}", now()));
@@ -105,7 +105,7 @@ fn new_run_folder(runs: &Path, command: &str) -> Result<PathBuf> {
     Ok(made.map_err(|e| deepfusion_data::Error::file(&folder, e))?)
 }
 
-/// Fails where a file is there that may not be replaced, or could not be written for want of its folder: an error before long work, not after it.
+/// Fails if the file exists and may not be replaced, or if its folder does not exist: an error before long work, not after it.
 pub(crate) fn require_new(file: &Path, overwrite: bool) -> Result<()> {
     if file.exists() && (!overwrite || file.is_dir()) {
         return Err(crate::error::CliError::Exists {
@@ -117,7 +117,7 @@ pub(crate) fn require_new(file: &Path, overwrite: bool) -> Result<()> {
     require_folder_of(file)
 }
 
-/// Fails where a file could not be written for want of its folder.
+/// Fails if the folder of a file does not exist.
 fn require_folder_of(file: &Path) -> Result<()> {
     match file.parent() {
         Some(folder) if folder != Path::new("") && !folder.is_dir() => {
@@ -148,7 +148,7 @@ mod tests {
 
     #[cfg(feature = "train")]
     #[test]
-    fn a_run_is_refused_before_it_begins() {
+    fn a_run_is_refused_before_it_starts() {
         let folder = tempfile::tempdir().unwrap();
         let run = folder.path().join("runs/run");
         require_run_folder(&run).unwrap();
@@ -160,7 +160,7 @@ mod tests {
         assert!(require_run_folder(&run).is_err());
     }
 
-    /// Whoever may write everywhere sees nothing of it.
+    /// Skipped for a user who may write everywhere.
     #[cfg(all(unix, feature = "train"))]
     #[test]
     fn a_folder_that_cannot_be_written_to_is_refused() {
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn two_that_start_at_once_have_a_folder_each() {
+    fn two_commands_that_start_at_once_have_a_folder_each() {
         let folder = tempfile::tempdir().unwrap();
         let runs = folder.path().join("runs");
         let first = new_run_folder(&runs, "train").unwrap();

@@ -1,4 +1,4 @@
-//! Progress on stderr: a bar on a terminal, a line now and then elsewhere.
+//! Progress on stderr: a bar on a terminal, otherwise a line from time to time.
 
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 static QUIET: AtomicBool = AtomicBool::new(false);
 
-/// Elsewhere than on a terminal, lines come no more often than this.
+/// Shortest time between two lines, where stderr is not a terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// Turns all progress off (`--quiet`).
@@ -24,7 +24,7 @@ pub(crate) fn say(text: &str) {
     }
 }
 
-/// A line on stderr. Where nobody reads it any more, as after the terminal was closed, the work goes on.
+/// A line on stderr. If stderr is closed, as after the terminal was, the work continues.
 fn print_line(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
@@ -34,18 +34,18 @@ pub(crate) struct Progress {
     what: String,
     bar: Option<ProgressBar>,
     last_line: Instant,
-    /// Short work needs no line: only what had one gets a last one.
+    /// Whether a line was printed. Only then a last line follows: short work needs none.
     printed: bool,
     quiet: bool,
 }
 
 impl Progress {
-    /// Begins; `what` is printed beside the numbers.
+    /// Starts at nothing done; `what` is printed beside the numbers.
     pub(crate) fn new(what: &str) -> Self {
         let quiet = QUIET.load(Ordering::Relaxed);
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-            // The template is a constant: were it wrong, the default style would do.
+            // The template is a constant; if it were wrong, the default style would be used.
             if let Ok(style) =
                 ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len}, {eta} left")
             {
@@ -68,7 +68,7 @@ impl Progress {
         self.bar.is_some()
     }
 
-    /// Words beside the bar; nothing where there is none.
+    /// Shows a text beside the bar, if there is one.
     pub(crate) fn note(&self, text: &str) {
         if let Some(bar) = &self.bar {
             bar.set_message(text.to_owned());
@@ -91,7 +91,7 @@ impl Progress {
 }
 
 impl Drop for Progress {
-    /// The bar goes away with the work; what was achieved is said by the command.
+    /// Removes the bar; the command itself reports the result.
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

@@ -1,4 +1,4 @@
-//! The on/off table through the program alone: made, gone on with, and refused.
+//! The on/off table through the program: made, continued, and refused.
 
 use std::fs;
 
@@ -34,7 +34,7 @@ fn the_table_grows_by_seeds_and_keeps_what_is_done() {
         .map(|l| l.split(',').next().unwrap())
         .collect();
     assert_eq!(rows, ["hce+speed+flow", "none", "minimum"]);
-    // What a row switches off, its run has off.
+    // A row's run has off what the row switches off.
     let config = |row: &str| {
         fs::read_to_string(at.join(format!("table/rows/{row}/seed-0/run/config.toml"))).unwrap()
     };
@@ -42,7 +42,7 @@ fn the_table_grows_by_seeds_and_keeps_what_is_done() {
     assert!(!config("none").contains("[depth_net.hce]"));
     assert!(config("minimum").contains("reprojection = \"minimum\""));
     for row in ["hce+speed+flow", "none", "minimum"] {
-        // Not attention with the context, not masks with the flow; and in no row a measured motion in the warp.
+        // The context does not switch on attention, nor the flow masks; and no row warps with measured motion.
         assert!(!config(row).contains("[depth_net.attention]"), "{row}");
         assert!(
             config(row).contains("[loss.moving]\nenabled = false"),
@@ -69,7 +69,7 @@ fn the_table_grows_by_seeds_and_keeps_what_is_done() {
         );
     }
 
-    // A second seed is added; the runs that are done are not made again, one that is half done goes on.
+    // A second seed is added: finished runs are not repeated, and one that is half done is continued.
     let result = at.join("table/rows/none/seed-0/result.json");
     let before = fs::metadata(&result).unwrap().modified().unwrap();
     fs::remove_file(at.join("table/rows/minimum/seed-0/result.json")).unwrap();
@@ -93,7 +93,7 @@ fn the_table_grows_by_seeds_and_keeps_what_is_done() {
 }
 
 #[test]
-fn what_cannot_be_a_table_is_refused() {
+fn an_impossible_table_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");

@@ -1,4 +1,4 @@
-//! `adapt`: what is kept, what is refused, what is gone on with and undone.
+//! `adapt`: results that are kept, refused, continued and undone.
 
 #![cfg(feature = "train")]
 
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use crate::support::{fails, json, ok, run};
 use serde_json::Value;
 
-/// Some 60 metres along a street that no network saw, and a network that is quick to learn.
+/// Some 60 metres along a street that no network has seen, and a network that trains quickly.
 const DRIVE: &str = "simulate --frames 60 --seed 90110 --size 320x96 --scan-every 0 --out drive";
 const ADAPT: &str =
     "adapt --model tiny --data drive --steps 4 --batch 1 --held-out 0.4 --set validate_every=4";
@@ -25,7 +25,7 @@ fn depth_of(at: &Path, model: &str, out: &str) -> Vec<u8> {
     arrays.iter().flat_map(|path| of(path)).collect()
 }
 
-/// The camera's height above the road as an adaptation measured it, which its configuration holds.
+/// The camera's height above the road as an adaptation measured it, from its configuration.
 fn seen_height(at: &Path, run: &str) -> f64 {
     let text = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
     let line = text
@@ -50,11 +50,11 @@ fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
 }
 
 #[test]
-fn what_gets_no_worse_is_kept_and_can_be_undone() {
+fn a_network_that_gets_no_worse_is_kept_and_can_be_undone() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(at, DRIVE);
-    // Steps too small to change anything: as good as before.
+    // Steps too small to change anything: the network stays as good as before.
     let found = json(
         at,
         &format!("{ADAPT} --simulated 1 --learning-rate 1e-9 --out mine --json"),
@@ -69,15 +69,15 @@ fn what_gets_no_worse_is_kept_and_can_be_undone() {
     assert!((after / before - 1.0).abs() < 1e-3, "{before}, {after}");
     assert!(at.join("mine/adapt.json").exists() && !at.join("mine.adapting").exists());
 
-    // Simulated streets were seen by the drive's camera, which hangs 1.65 m above the road.
+    // Streets were simulated for the drive's camera, which is 1.65 m above the road.
     let height = seen_height(at, "mine");
     assert!((height - 1.65).abs() < 0.15, "{height}");
 
-    // The vehicle's motion warps the views: nobody asks a PoseNet, so there is none.
+    // The vehicle's motion warps the views, so no PoseNet is needed and there is none.
     let odometry = "eval-odometry --model mine --data drive";
     fails(at, odometry, &["mine", "has no PoseNet", "`freeze`"]);
 
-    // The run is one like any other, without a word of its data sets.
+    // The run is like any other: its data sets need not be named.
     let given = depth_of(at, "tiny", "given");
     let learned = depth_of(at, "mine", "learned");
     assert_ne!(learned, given, "something was learned");
@@ -88,11 +88,11 @@ fn what_gets_no_worse_is_kept_and_can_be_undone() {
 }
 
 #[test]
-fn what_gets_worse_is_refused() {
+fn a_network_that_gets_worse_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(at, DRIVE);
-    // Steps so large that they ruin any network.
+    // Steps large enough to ruin any network.
     let command = format!(
         "{ADAPT} --simulated 0 --learning-rate 0.03 --set learning_rate_warmup_steps=0 --out mine"
     );
@@ -112,17 +112,17 @@ fn what_gets_worse_is_refused() {
 }
 
 #[test]
-fn an_interrupted_one_is_gone_on_with() {
+fn an_interrupted_adaptation_is_continued() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(at, &format!("{DRIVE} --stereo 0.5"));
     let command =
         format!("{ADAPT} --camera both --simulated 0 --learning-rate 1e-9 --out mine --json");
     let whole = json(at, &command);
-    // Of two cameras each is a view of the other, without a word of it.
+    // Each of two cameras is a view of the other, without being asked for.
     let config = fs::read_to_string(at.join("mine/config.toml")).unwrap();
     assert!(config.contains("stereo = true"), "{config}");
-    // As it stood before the last judgement.
+    // As it was before the last evaluation.
     fs::rename(at.join("mine"), at.join("mine.adapting")).unwrap();
     fs::remove_file(at.join("mine.adapting/adapt.json")).unwrap();
     fails(
@@ -133,7 +133,7 @@ fn an_interrupted_one_is_gone_on_with() {
     let again = json(at, &command);
     assert_eq!(again, whole);
     fails(at, &command, &["mine", "already exists"]);
-    // Nor is anything begun where nothing can be judged.
+    // Nothing is started if the result could not be judged.
     ok(
         at,
         "simulate --frames 4 --seed 3 --scan-every 0 --out short",

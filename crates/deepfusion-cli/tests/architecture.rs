@@ -1,5 +1,5 @@
-//! The crates and their arrows, as ARCHITECTURE.md and its drawing say them; what libraries may say, and what documents may name.
-//! `UPDATE_REFERENCE=1` draws anew.
+//! The crates and their dependencies, as in ARCHITECTURE.md and its graph; options in libraries' texts; paths and links in documents.
+//! `UPDATE_REFERENCE=1` redraws the graph.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -11,7 +11,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// What a manifest names of the workspace's crates, tests and benches apart.
+/// The workspace's crates that a manifest names, except for tests and benches.
 fn uses(manifest: &Path) -> BTreeSet<String> {
     let manifest: toml::Table = fs::read_to_string(manifest).unwrap().parse().unwrap();
     let uses = manifest.get("dependencies").and_then(toml::Value::as_table);
@@ -21,7 +21,7 @@ fn uses(manifest: &Path) -> BTreeSet<String> {
         .collect()
 }
 
-/// What each crate of the workspace uses of the others.
+/// The crates of the workspace that each of them uses.
 fn arrows() -> Arrows {
     let mut arrows = Arrows::new();
     for entry in fs::read_dir(root().join("crates")).unwrap() {
@@ -32,14 +32,14 @@ fn arrows() -> Arrows {
     arrows
 }
 
-/// The same, with the Python package, which lies beside the crates.
+/// As [`arrows`], with the Python package, which is beside the crates.
 fn arrows_with_python() -> Arrows {
     let mut arrows = arrows();
     arrows.insert("python".to_owned(), uses(&root().join("python/Cargo.toml")));
     arrows
 }
 
-/// All that a crate uses, directly or not.
+/// All crates that a crate uses, directly or not.
 fn reached<'a>(arrows: &'a Arrows, from: &str, seen: &mut BTreeSet<&'a str>) {
     for used in &arrows[from] {
         if seen.insert(used) {
@@ -48,7 +48,7 @@ fn reached<'a>(arrows: &'a Arrows, from: &str, seen: &mut BTreeSet<&'a str>) {
     }
 }
 
-/// The arrows that follow from no others.
+/// The graph as a drawing, without arrows that follow from others.
 fn drawing(arrows: &Arrows) -> String {
     let mut text = String::from("graph TD\n");
     for (name, uses) in arrows {
@@ -68,7 +68,7 @@ fn drawing(arrows: &Arrows) -> String {
 }
 
 #[test]
-fn the_drawing_is_of_todays_crates() {
+fn the_drawing_is_up_to_date() {
     let page = root().join("docs/reference/crates.md");
     let expected = format!(
         "# The crates\n\nWhat each crate uses, without the arrows that follow from others. Drawn from the crates' manifests by\n\n\
@@ -108,7 +108,7 @@ fn every_crate_is_described_above_what_it_uses() {
     }
 }
 
-/// A crate's tests are one binary, and a file that its `main.rs` forgot would never run.
+/// A crate's tests are one binary; a file missing from its `main.rs` would never run.
 #[test]
 fn every_file_of_tests_is_part_of_a_binary() {
     for name in arrows().into_keys() {
@@ -129,7 +129,7 @@ fn every_file_of_tests_is_part_of_a_binary() {
     }
 }
 
-/// What runs networks must build without what trains them.
+/// The crates that run networks must build without the training framework.
 #[test]
 fn running_needs_no_training_framework() {
     let arrows = arrows();
@@ -151,7 +151,7 @@ fn running_needs_no_training_framework() {
     }
 }
 
-/// Files below a folder, build outputs apart.
+/// Files below a folder, except for build outputs.
 fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -163,7 +163,7 @@ fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The string literals of a source, without its comments and the tests at its end.
+/// The string literals of a source file, without its comments and the tests at its end.
 fn literals(source: &str) -> Vec<&str> {
     let source = source.split("#[cfg(test)]\nmod ").next().unwrap();
     let mut found = Vec::new();
@@ -207,10 +207,10 @@ fn literals_are_found_beside_comments_characters_and_tests() {
     assert_eq!(literals(source), ["one \\\" more", "two", "thr\"ee"]);
 }
 
-/// A library names settings and files, in texts and comments; which option sets one, the command line says (`failure/`).
+/// A library names settings and files in texts and comments; only the command line (`failure/`) names the option that sets one.
 #[test]
 fn libraries_name_no_options() {
-    // Other people's programs.
+    // Options of other programs.
     let allowed = [
         "v4l2-ctl --list-devices",
         "ros2 bag record --compression-mode",
@@ -239,7 +239,7 @@ fn libraries_name_no_options() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// What documents name in the repository is there: a path from its root, or the end of a source's path.
+/// Paths that documents name exist in the repository: from its root, or as the end of a source file's path.
 #[test]
 fn paths_in_documents_exist() {
     let root = root().canonicalize().unwrap();
@@ -283,7 +283,7 @@ fn paths_in_documents_exist() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// The heading's anchor as GitHub makes it: small letters, digits, dashes and underscores, spaces as dashes.
+/// The heading's anchor as GitHub makes it: lower-case letters, digits, dashes and underscores, spaces as dashes.
 fn anchor(heading: &str) -> String {
     let heading = heading.trim_start_matches('#').trim().to_lowercase();
     let kept = heading.chars().filter_map(|c| match c {
@@ -294,7 +294,7 @@ fn anchor(heading: &str) -> String {
     kept.collect()
 }
 
-/// Links between documents lead to a file and a heading that are there.
+/// Links between documents lead to an existing file and heading.
 #[test]
 fn links_in_documents_lead_somewhere() {
     let root = root().canonicalize().unwrap();

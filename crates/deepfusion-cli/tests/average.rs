@@ -1,4 +1,4 @@
-//! `weights average`: one network out of several.
+//! `weights average`: one network from several.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::support::{fails, json, ok, run};
 use serde_json::Value;
 
-/// Whether training saw the drive, as the evaluation says that a run keeps.
+/// Whether training saw the drive, according to the run's saved evaluation.
 fn held_out(at: &Path, model: &str, drive: &str) -> Value {
     let kept = at.join(model).join("eval");
     let _ = fs::remove_dir_all(&kept);
@@ -18,7 +18,7 @@ fn held_out(at: &Path, model: &str, drive: &str) -> Value {
 }
 
 #[test]
-fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
+fn a_mean_of_runs_counts_as_trained_on_all_their_drives() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for (name, seed) in [("first", 3), ("second", 4), ("third", 5)] {
@@ -33,11 +33,11 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     let made = ok(at, "weights average a b --out mean");
     assert!(made.stdout.starts_with("mean"), "{}", made.stdout);
     assert!(made.stderr.contains("0.500 of "), "{}", made.stderr);
-    // One comes from the other; their batch norms followed other batches.
+    // One was trained from the other; their batch norms have different statistics.
     let warned: Vec<&str> = made.stderr.lines().filter(|l| l.contains("WARN")).collect();
     assert_eq!(warned.len(), 1, "{}", made.stderr);
     assert!(warned[0].contains("batch norms differ"), "{}", made.stderr);
-    // The settings are those of `a`, which saw the first drive alone.
+    // The settings are those of `a`, which was trained only on the first drive.
     assert_eq!(held_out(at, "a", "second"), true);
     for (drive, unseen) in [("first", false), ("second", false), ("third", true)] {
         assert_eq!(held_out(at, "mean", drive), unseen, "{drive}");
@@ -49,17 +49,21 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     assert_eq!(card["data"], serde_json::json!(["first", "second"]));
     fails(at, "train --out mean --resume", &["optimiser"]);
 
-    // A run by its settings is not the mean of anything, and goes on.
+    // A run started from these settings is not a mean, and can be continued.
     let from = format!("{train} --config mean/config.toml --data third");
     let went_on = ok(at, &format!("{from} --init mean --out on"));
-    assert!(!went_on.stderr.contains("to a mean"), "{}", went_on.stderr);
-    // Else it would be the first network's run again.
+    assert!(
+        !went_on.stderr.contains("mean of 2 networks"),
+        "{}",
+        went_on.stderr
+    );
+    // Otherwise it would repeat the first network's run.
     fails(
         at,
         "train --config mean/config.toml --data nowhere --out off",
         &["WARN", "mean of 2 networks", "--init mean ", "nowhere"],
     );
-    // Elsewhere its folder is not known, and who wrote what to begin from meant it.
+    // Elsewhere its folder is unknown, and an `init` that was given is intended.
     let settings = fs::read_to_string(at.join("mean/config.toml")).unwrap();
     let chosen = format!("init = \"b\"\n{settings}");
     for (text, warns) in [(settings, true), (chosen, false)] {
@@ -77,9 +81,13 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     }
     let on = fs::read_to_string(at.join("on/config.toml")).unwrap();
     assert!(!on.contains("averaged"), "{on}");
-    assert_eq!(held_out(at, "on", "second"), false, "by what it began from");
+    assert_eq!(
+        held_out(at, "on", "second"),
+        false,
+        "because of the network it started from"
+    );
 
-    // A packed network is one of them, as an embedded one is.
+    // A packed network can be averaged, as an embedded one can.
     let third = json(
         at,
         "weights average a packed/hut.safetensors --shares 3,1 --out c --json",
@@ -90,7 +98,7 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     assert!(0 < differ("layers") && differ("layers") <= differ("of"));
     let left_out = &third["statistics"]["left_out"];
     assert!(left_out.as_f64().unwrap() > 0.0, "{left_out}");
-    // Of what it was made nothing is known but its kind.
+    // Of its training data only the kind is known.
     assert_eq!(held_out(at, "c", "third"), Value::Null);
 
     fails(
@@ -122,8 +130,8 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
 
     hides_the_embedded_network(at);
 
-    // A mean has seen what its networks have: simulated drives, one of which nothing shows it, one that bears the name of a day of
-    // KITTI's, and one that is gone.
+    // A mean was trained on its networks' data: simulated drives, one that nothing shows to be simulated, one named like a day of
+    // KITTI's, and one that no longer exists.
     let pack = "weights pack --model mean --name blind --simulated-only --out blind --overwrite";
     assert!(!ok(at, pack).stderr.contains("WARN"));
     let is_unsure = || {
@@ -142,7 +150,7 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     is_unsure();
 }
 
-/// A run of an embedded network's name is taken for it, and not without a word.
+/// A run with an embedded network's name is used instead of it, with a warning.
 fn hides_the_embedded_network(at: &Path) {
     let Some(name) = deepfusion_weights::names().next() else {
         return;

@@ -1,4 +1,4 @@
-//! Bags through the program alone: written, looked into, converted, trained on, measured.
+//! Bags through the program: written, inspected, converted, trained on, evaluated.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use deepfusion_rosbag::{BagWriter, Time, WriterOptions};
 use serde_json::Value;
 
 #[test]
-fn bags_are_trained_on_and_measured_by_scenario() {
+fn bags_are_trained_on_and_evaluated_by_scenario() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for (scene, moving) in [("urban", 4), ("garage", 0)] {
@@ -78,7 +78,7 @@ fn an_option_of_another_layout_is_refused() {
     ] {
         let refused = run(folder.path(), &format!("simulate --out new {args}"));
         assert_eq!(refused.code, 2, "{}", refused.stderr);
-        for part in [option, "not for this layout", layout] {
+        for part in [option, "does not apply to this layout", layout] {
             assert!(refused.stderr.contains(part), "{part}: {}", refused.stderr);
         }
         assert!(!folder.path().join("new").exists());
@@ -98,7 +98,7 @@ fn a_bag_is_converted_both_ways() {
     let inspection = json(at, "data inspect kitti --json");
     assert_eq!(inspection["kind"], "kitti_raw");
     assert_eq!(inspection["size"], serde_json::json!([64, 48]));
-    // KITTI alone numbers its cameras.
+    // Only KITTI numbers its cameras.
     let text = ok(at, "data inspect kitti").stdout;
     assert!(text.contains("_sync (camera 2)"), "{text}");
     let text = ok(at, "data inspect sim").stdout;
@@ -142,7 +142,7 @@ fn a_warning_of_opening_is_printed_once() {
         (1..40).contains(&frames),
         "cut in the middle: {frames} frames"
     );
-    // The same recording to train and to validate on is one.
+    // The same recording to train on and to validate on counts once.
     let small = "--preset tiny --size 64x64 --batch 2 --steps 1 --init none";
     let refused = run(
         at,
@@ -161,7 +161,7 @@ fn a_warning_of_opening_is_printed_once() {
     warned(&trained.stderr);
     let predicted = ok(at, "predict --model run sim/urban_0001.bag --out depth");
     warned(&predicted.stderr);
-    // Its images are in no file that a viewer could open: they are kept, unless --save says what is wanted.
+    // No viewer can open its images, so they are saved unless --save says otherwise.
     let images = |folder: &str| {
         let names = std::fs::read_dir(at.join(folder)).unwrap();
         let names = names.map(|e| e.unwrap().file_name().into_string().unwrap());
@@ -189,7 +189,7 @@ fn a_warning_of_opening_is_printed_once() {
     assert_eq!(images("without"), 0);
 }
 
-/// A bag of two seconds without a camera: an inertial unit that turns left by 0.3 rad/s, and, where asked for, odometry
+/// A bag of two seconds without a camera: an inertial unit that turns left by 0.3 rad/s, and, if asked for, odometry
 /// of a vehicle that stands and turns right by 0.2 rad/s.
 fn write_without_camera(path: &Path, odometry: bool) {
     let mut bag = BagWriter::create(path, WriterOptions::default()).unwrap();
@@ -246,7 +246,7 @@ fn write_without_camera(path: &Path, odometry: bool) {
 }
 
 #[test]
-fn a_bag_without_a_camera_says_how_the_vehicle_turned() {
+fn a_bag_without_a_camera_has_the_vehicles_turns() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for (name, odometry, turned) in [("imu.bag", false, 0.6), ("odom.bag", true, -0.4)] {
@@ -268,7 +268,7 @@ fn bags_of_ros_2_are_not_written() {
     ok(at, "simulate --out sim --frames 4 --size 64x48");
     for name in ["foo.mcap", "foo.DB3"] {
         let args = format!("data convert sim {name}");
-        fails(at, &args, &[name, "read, not written", ".bag"]);
+        fails(at, &args, &[name, "can be read, but not written", ".bag"]);
         assert!(!at.join(name).exists());
     }
 }
@@ -283,7 +283,7 @@ fn a_bag_of_ros_2_is_read_like_one_of_ros_1() {
     let at = Path::new(bags);
     let [one, two] =
         ["drive.bag", "drive_ros2"].map(|name| json(at, &format!("data inspect {name} --json")));
-    // Its script writes fewer images and scans of it.
+    // The script that makes it writes fewer images and scans.
     assert_eq!((&one["frames"], &two["frames"]), (&51.into(), &11.into()));
     for key in ["kind", "size", "intrinsics"] {
         assert!(!one[key].is_null(), "{key}");
@@ -293,12 +293,12 @@ fn a_bag_of_ros_2_is_read_like_one_of_ros_1() {
 
 #[cfg(not(feature = "ros2"))]
 #[test]
-fn a_build_without_ros_2_says_how_to_build_one_with() {
+fn a_build_without_ros_2_says_how_to_build_it_in() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     std::fs::create_dir(at.join("drive")).unwrap();
     std::fs::write(at.join("drive/drive_0.mcap"), b"").unwrap();
-    // A run by its looks: what is wrong with the input is an error before its network is read.
+    // This only looks like a run: the input's error comes before the network is read.
     std::fs::create_dir(at.join("run")).unwrap();
     std::fs::write(at.join("run/config.toml"), b"").unwrap();
     for place in ["drive", "drive/drive_0.mcap"] {
@@ -310,7 +310,7 @@ fn a_build_without_ros_2_says_how_to_build_one_with() {
 }
 
 #[test]
-fn what_is_wrong_with_a_bag_is_said() {
+fn a_bags_errors_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -332,7 +332,10 @@ fn what_is_wrong_with_a_bag_is_said() {
     };
     let error = failing("[topics]\nspeed = \"/wheels\"\n");
     assert!(error.contains("has no topic /wheels"), "{error}");
-    assert!(error.contains("/vehicle/speed"), "what there is: {error}");
+    assert!(
+        error.contains("/vehicle/speed"),
+        "the topics that exist: {error}"
+    );
     let error = failing("[vehicel]\nwheelbase_m = 2.7\n");
     assert!(error.contains("unknown field `vehicel`"), "{error}");
     let camera =
@@ -343,7 +346,7 @@ fn what_is_wrong_with_a_bag_is_said() {
         "{error}"
     );
     std::fs::write(&sidecar, good).unwrap();
-    // Cut in the middle: what is whole is read, and the inspection says what is not.
+    // Cut in the middle: the intact part is read, and the inspection reports the damage.
     let bytes = std::fs::read(&bag).unwrap();
     std::fs::write(&bag, &bytes[..bytes.len() / 2]).unwrap();
     let text = ok(at, "data inspect sim").stdout;
@@ -392,7 +395,7 @@ fn a_damaged_bag_does_not_hide_the_others() {
         "sim: 1 of 2 recordings cannot be read",
         "hint: each is listed with its reason",
         "name ROS 2 recordings .mcap or .db3",
-        "or give the others by themselves",
+        "or give only the others",
     ] {
         assert!(listed.stderr.contains(part), "{part}: {}", listed.stderr);
     }
@@ -402,7 +405,7 @@ fn a_damaged_bag_does_not_hide_the_others() {
     assert_eq!((&seen["frames"], &seen["kind"]), (&6.into(), &"bag".into()));
     let damaged = seen["unreadable"][0]["path"].as_str().unwrap();
     assert!(damaged.ends_with("damaged.bag"), "{damaged}");
-    // Of a part nothing is written: beside neither of two bags that a file could be written for.
+    // If one bag is damaged, no file is written, not even beside the two good ones.
     std::fs::remove_file(at.join("sim/damaged.bag")).unwrap();
     let (bag, other) = (at.join("sim/urban_0001.bag"), at.join("sim/other.bag"));
     std::fs::copy(&bag, &other).unwrap();
@@ -417,7 +420,7 @@ fn a_damaged_bag_does_not_hide_the_others() {
     assert!(!bag.with_extension("toml").exists());
     let kept = std::fs::read_to_string(other.with_extension("toml")).unwrap();
     assert_eq!(kept, camera);
-    // Once nothing is wrong, both are.
+    // Without the damaged one, both are written.
     std::fs::remove_file(other.with_extension("toml")).unwrap();
     ok(at, "data inspect sim --write-config");
     for bag in [bag, other] {
@@ -425,9 +428,9 @@ fn a_damaged_bag_does_not_hide_the_others() {
     }
 }
 
-/// Nothing is left to be given by itself where none can be read, and one reason is said as that of one recording.
+/// If no bag can be read, the hint does not suggest giving the others, and a common reason is reported as if of one recording.
 #[test]
-fn of_bags_that_cannot_be_read_the_reasons_are_said() {
+fn the_reasons_why_bags_cannot_be_read_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     std::fs::create_dir(at.join("sim")).unwrap();
@@ -482,7 +485,7 @@ fn a_bag_as_ros_records_it_is_trained_on_without_a_file_beside_it() {
     let config = std::fs::read_to_string(at.join("run/config.toml")).unwrap();
     assert!(!config.contains("topics"), "{config}");
 
-    // The file that says the same; what is read is what was read without it.
+    // A file beside the bag with the same content changes nothing.
     let wrote = ok(at, "data inspect drive.bag --write-config");
     assert!(
         wrote.stderr.contains("drive.toml written"),
@@ -561,7 +564,7 @@ fn a_topic_is_named_by_an_option() {
         "{}",
         wrong.stderr
     );
-    // What has no topics is refused, not read as if nothing had been said.
+    // The option is refused for a recording without topics, not ignored.
     ok(at, "simulate --out street --frames 4 --size 64x48");
     fails(
         at,

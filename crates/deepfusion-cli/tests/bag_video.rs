@@ -1,8 +1,8 @@
-//! Bags whose camera is a video stream: a simulated drive's pictures, encoded by the machine's ffmpeg, as messages of each kind.
+//! Bags whose camera is a video stream: a simulated drive's images, encoded by the installed ffmpeg, as messages of each type.
 //!
-//! What comes back is compared with the pictures that were encoded. Two lossy codecs lie between: x264 at a quantiser of 12, then
-//! JPEGs of ffmpeg's second best quality, both with half the colours. 30 dB is what is lost on these 96×64 pixels at worst, with
-//! some room. A neighbouring picture of the drive is several dB farther away.
+//! The decoded images are compared with those that were encoded, after two lossy codecs: x264 at a quantiser of 12, then
+//! JPEGs of ffmpeg's second best quality, both with subsampled colours. On these 96×64 pixels the worst PSNR is above 30 dB, with
+//! some margin. A neighbouring image of the drive is several dB lower.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -66,10 +66,10 @@ impl Drive {
         self.folder.path()
     }
 
-    /// The pictures as packets, one each; `None`, said, where the machine's ffmpeg has no such encoder.
+    /// The pictures as packets, one each; `None`, with a message, if the installed ffmpeg lacks this encoder.
     fn encode(&self, encoder: &str, extra: &[&str]) -> Option<Vec<Vec<u8>>> {
         let (file, common): (_, &[&str]) = match encoder {
-            // A mark in front of every picture, by which they are told apart.
+            // A delimiter before every picture, which separates the packets.
             "libx264" => (
                 "s.h264",
                 &["-qp", "12", "-bf", "0", "-x264-params", "aud=1"],
@@ -132,7 +132,7 @@ impl Drive {
         Some(packets)
     }
 
-    /// The drive's bag with packets in the place of its pictures; `None` is a message that was lost.
+    /// The drive's bag with packets in place of its pictures; `None` is a lost message.
     fn bag(&self, name: &str, kind: Kind, format: &str, packets: &[Option<Vec<u8>>]) -> PathBuf {
         let source = Bag::open(self.at().join("sim/urban_0001.bag")).unwrap();
         let path = self.at().join(name);
@@ -173,11 +173,11 @@ impl Drive {
         path
     }
 
-    /// Every frame is the picture it should be, and at its time: the frames from the `first` on are those of the pictures.
+    /// Asserts that every frame has the right picture and time: the bag's frames are the pictures from the `first` on.
     fn came_back(&self, bag: &Path, first: usize) {
         let drive = open(bag).unwrap();
         assert_eq!(drive.frames().len(), FRAMES - first);
-        // In any order, as training asks for them.
+        // In any order, as training reads them.
         for n in (first..FRAMES).rev() {
             let frame = &drive.frames()[n - first];
             // The data set's clock begins with its first image.
@@ -194,7 +194,7 @@ impl Drive {
         }
     }
 
-    /// What is said when an image is asked for.
+    /// The error when an image is read.
     fn refused(&self, bag: &Path) -> String {
         let error = open(bag).and_then(|d| d.load_image(0)).unwrap_err();
         let left = fs::read_dir(self.at()).unwrap();
@@ -205,7 +205,7 @@ impl Drive {
 }
 
 impl Kind {
-    /// Type, MD5 and definition, and the bytes.
+    /// Type, MD5, definition and bytes of a message.
     fn message<'t>(
         self,
         header: Header,
@@ -269,7 +269,7 @@ fn psnr(a: &RgbImage, b: &RgbImage) -> f64 {
     10.0 * (255.0 * 255.0 * a.as_raw().len() as f64 / sum.max(1e-9)).log10()
 }
 
-/// Packets that each begin with a unit that `begins` knows by its first byte.
+/// Packets that each begin with a unit whose first byte `begins` recognises.
 fn annex_b(bytes: &[u8], begins: impl Fn(u8) -> bool) -> Vec<Vec<u8>> {
     let starts = bytes.windows(4).enumerate();
     let starts = starts.filter(|(_, w)| w[..3] == [0, 0, 1] && begins(w[3]));
@@ -281,7 +281,7 @@ fn annex_b(bytes: &[u8], begins: impl Fn(u8) -> bool) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// The packets of an IVF file: behind 32 bytes, each after its length and a time of eight bytes.
+/// The packets of an IVF file: after 32 bytes, each packet follows its length and a time of eight bytes.
 fn ivf(bytes: &[u8]) -> Vec<Vec<u8>> {
     let mut rest = &bytes[32..];
     let mut packets = Vec::new();
@@ -308,7 +308,7 @@ fn frames_of_every_kind_come_back_in_order() {
             drive.came_back(&bag, 0);
         }
         let cache = drive.at().join("video.bag.camera.image_rect.ffmpeg.frames");
-        // Its frames and what they are of; and they are not made again.
+        // The frames, and the record of what they were made from; they are not made again.
         assert_eq!(fs::read_dir(&cache).unwrap().count(), FRAMES + 1);
         fs::write(cache.join("0000000003.jpg"), "broken").unwrap();
         let again = open(&drive.at().join("video.bag")).unwrap();
@@ -328,14 +328,14 @@ fn frames_of_every_kind_come_back_in_order() {
 }
 
 #[test]
-fn the_command_takes_a_stream_as_it_takes_pictures() {
+fn the_command_reads_a_stream_as_it_reads_images() {
     let drive = Drive::new();
     let Some(packets) = drive.encode("libx264", &[]) else {
         return;
     };
     let at = drive.at();
     let bag = drive.bag("drive.bag", Kind::Video, "h264", &some(&packets));
-    // Its file says where the frames go, and which topic it is.
+    // The file beside the bag says where the frames go, and which topic is the camera's.
     ok(at, "data inspect drive.bag --write-config");
     let config = fs::read_to_string(at.join("drive.toml")).unwrap();
     assert!(
@@ -373,7 +373,7 @@ fn the_command_takes_a_stream_as_it_takes_pictures() {
 }
 
 #[test]
-fn what_comes_before_the_first_key_frame_is_left_out_and_said() {
+fn frames_before_the_first_key_frame_are_left_out_with_a_warning() {
     let drive = Drive::new();
     let Some(packets) = drive.encode("libx264", &[]) else {
         return;
@@ -388,7 +388,7 @@ fn what_comes_before_the_first_key_frame_is_left_out_and_said() {
     let said = format!("/camera/image_rect/ffmpeg: the first {} messages", KEYS - 3);
     assert!(warnings.contains(&said), "{warnings}");
 
-    // None at all: nothing can be seen.
+    // Without any key frame there are no images.
     let mut none = some(&packets);
     none[0] = None;
     none.truncate(KEYS);
@@ -416,7 +416,7 @@ fn gaps_and_damage_are_reported_with_the_message() {
         }
     };
     let place = |number: usize| format!("/camera/image_rect/ffmpeg, message {number}: ");
-    // Message 11 was lost: what is the eleventh now refers to it. Of a lost key frame, too.
+    // Message 11 was lost: the one after it depends on it. The same holds for a lost key frame.
     for lost in [11, 2 * KEYS] {
         let mut gap = some(&packets);
         gap[lost] = None;
@@ -465,7 +465,7 @@ fn gaps_and_damage_are_reported_with_the_message() {
     // I, P, and the first B.
     says(&text, &[&place(2), "B-frame", "-bf 0"]);
 
-    // HEVC is not looked into here: ffmpeg complains, and is asked again for fewer packets until it does not.
+    // HEVC packets are not parsed here: ffmpeg reports an error, and is run again with fewer packets until it does not.
     if let Some(packets) = drive.encode("libx265", &[]) {
         let mut gap = some(&packets);
         gap[11] = None;
@@ -481,13 +481,13 @@ fn gaps_and_damage_are_reported_with_the_message() {
 }
 
 #[test]
-fn many_may_ask_at_once_and_nothing_is_left_of_it() {
+fn several_readers_at_once_leave_no_temporary_files() {
     let drive = Drive::new();
     let Some(packets) = drive.encode("libx264", &[]) else {
         return;
     };
     let bag = drive.bag("drive.bag", Kind::Image, "h264", &some(&packets));
-    // A data set of its own each, as processes have.
+    // Each with its own data set, as in separate processes.
     std::thread::scope(|scope| {
         for n in 0..4 {
             let bag = &bag;
@@ -501,9 +501,9 @@ fn many_may_ask_at_once_and_nothing_is_left_of_it() {
 }
 
 #[test]
-fn without_ffmpeg_it_is_asked_for() {
+fn a_missing_ffmpeg_is_an_error_with_a_hint() {
     let drive = Drive::new();
-    // Two packets that begin as H.264 does; nobody decodes them.
+    // Two packets that begin as H.264 does; they are never decoded.
     let key = [
         0, 0, 1, 0x67, 66, 0, 30, 0xda, 0x40, 0, 0, 1, 0x65, 0xe0, 0x80,
     ];

@@ -1,4 +1,4 @@
-//! Prediction in bulk: shards, runs that were stopped, images that cannot be read.
+//! Bulk prediction: shards, stopped runs, unreadable images.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -22,7 +22,7 @@ fn start(folder: &Path, args: &str) -> Child {
         .unwrap()
 }
 
-/// A drive of 30 small pictures and a network that has hardly learned.
+/// A drive of 30 small pictures and a network that has hardly been trained.
 fn prepare(folder: &Path) {
     ok(
         folder,
@@ -34,7 +34,7 @@ fn prepare(folder: &Path) {
     );
 }
 
-/// The folder's outputs and sidecars by name; manifests, which say how the work was shared, left out.
+/// The folder's outputs and sidecars by name, without manifests, which depend on how the work was shared.
 fn outputs(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     fs::read_dir(folder)
         .unwrap()
@@ -57,11 +57,11 @@ fn json(path: &Path) -> Value {
 }
 
 #[test]
-fn shards_started_at_once_make_what_one_run_makes() {
+fn shards_started_at_once_write_what_one_run_writes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     prepare(at);
-    // Two folders with the same names: what outputs are called depends on all inputs.
+    // Two folders with the same file names: outputs' names depend on all inputs.
     fs::create_dir(at.join("more")).unwrap();
     for i in 0..4 {
         let name = format!("000000000{i}.png");
@@ -105,7 +105,7 @@ fn shards_started_at_once_make_what_one_run_makes() {
         "{}",
         again.stderr
     );
-    // Outputs among the images are no images: another run finds nothing new.
+    // Outputs among the images are not inputs: another run finds nothing new.
     let among = format!("{predict} more --out more");
     ok(at, &among);
     let once = outputs(&at.join("more"));
@@ -116,12 +116,12 @@ fn shards_started_at_once_make_what_one_run_makes() {
         &format!("{predict} more/0000000000_depth.png --out more"),
         &["0000000000_depth.png: no image", "hint: give the images"],
     );
-    // Nor are they where other outputs go.
+    // Nor are they if outputs go elsewhere.
     ok(at, &format!("{predict} more --out apart"));
     assert_eq!(outputs(&at.join("apart")).len(), 4 * 4);
 }
 
-/// A look at the beginning, and the rest afterwards.
+/// First the first frames of each recording, then the rest.
 #[test]
 fn the_first_of_each_recording_are_done_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -138,7 +138,7 @@ fn the_first_of_each_recording_are_done_alone() {
     let predict = "predict sim more --model tiny --save npy --out out";
     let said = ok(at, &format!("{predict} --frames 2")).stderr;
     assert!(said.contains("4 images written"), "{said}");
-    // Their names are those of the whole.
+    // The outputs' names are the same as for the whole.
     let said = ok(at, predict).stderr;
     assert!(said.contains("3 images written"), "{said}");
     let line = ok(
@@ -149,7 +149,7 @@ fn the_first_of_each_recording_are_done_alone() {
 }
 
 #[test]
-fn a_camera_that_may_be_wrong_is_warned_of() {
+fn a_camera_that_may_be_wrong_gives_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -157,14 +157,14 @@ fn a_camera_that_may_be_wrong_is_warned_of() {
         "simulate --out sim --frames 1 --seed 3 --scan-every 0 --size 96x64",
     );
     let predict = format!("predict {DRIVE}/0000000000.png --model tiny");
-    // Nobody gave a camera, and KITTI's calibration lies some folders up.
+    // No camera is given, and KITTI's calibration is some folders up.
     let said = ok(at, &format!("{predict} --out a")).stderr;
     let calibration = Path::new("2026_01_01").join("calib_cam_to_cam.txt");
     assert!(
         said.contains("--calib") && said.contains(calibration.to_str().unwrap()),
         "{said}"
     );
-    // Numbers of a picture twice the size, and half the size.
+    // Intrinsics of images of twice the size, and of half the size.
     for (intrinsics, out) in [("112,112,95,63", "b"), ("28,28,23.5,15.5", "c")] {
         let said = ok(
             at,
@@ -173,7 +173,7 @@ fn a_camera_that_may_be_wrong_is_warned_of() {
         .stderr;
         assert!(said.contains("images of another size"), "{said}");
     }
-    // Its own, and those of one that was cut at the top.
+    // The image's own intrinsics, and those of an image that was cut at the top.
     for (intrinsics, out) in [("56,56,47,31", "d"), ("56,56,47,8", "e")] {
         let said = ok(
             at,
@@ -184,9 +184,9 @@ fn a_camera_that_may_be_wrong_is_warned_of() {
     }
 }
 
-/// Of pictures like nothing that a network learned from the first is named, and done all the same.
+/// Of pictures unlike any that the network was trained on, the first is named in a warning; all are predicted.
 #[test]
-fn an_image_of_extreme_size_is_warned_of() {
+fn an_image_of_extreme_size_gives_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::create_dir(at.join("odd")).unwrap();
@@ -208,7 +208,7 @@ fn an_image_of_extreme_size_is_warned_of() {
 }
 
 #[test]
-fn a_run_that_was_killed_goes_on() {
+fn a_killed_run_can_be_continued() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     prepare(at);
@@ -216,7 +216,7 @@ fn a_run_that_was_killed_goes_on() {
     ok(at, &format!("{predict} --out whole"));
     let whole = outputs(&at.join("whole"));
 
-    // Killed in the middle, wherever that is.
+    // Killed somewhere in the middle.
     let mut child = start(at, &format!("{predict} --out killed"));
     let done = |folder: &Path| {
         let files = fs::read_dir(folder).into_iter().flatten();
@@ -236,13 +236,13 @@ fn a_run_that_was_killed_goes_on() {
     ok(at, &format!("{predict} --out killed"));
     assert_same(&outputs(&at.join("killed")), &whole);
 
-    // What a kill can leave: outputs without a sidecar, a file being written, a file cut off by the system.
+    // Possible after a kill: outputs without a sidecar, a temporary file, a truncated file.
     let out = at.join("killed");
     fs::remove_file(out.join("0000000004.json")).unwrap();
     fs::write(out.join(".0000000004_depth.npy.71-3.partial"), "half").unwrap();
     fs::write(out.join("0000000007.ply"), "half").unwrap();
     fs::remove_file(out.join("0000000009_depth.png")).unwrap();
-    // And a power cut: zeros in place of what was not on the disk yet, of an output and of a sidecar; half a sidecar.
+    // Possible after a power cut: zeros in an output and a sidecar that were not on the disk yet; half a sidecar.
     let zeros = |name: &str| {
         let file = out.join(name);
         let bytes = fs::metadata(&file).unwrap().len();
@@ -252,7 +252,7 @@ fn a_run_that_was_killed_goes_on() {
     zeros("0000000013.json");
     let sidecar = fs::read(out.join("0000000015.json")).unwrap();
     fs::write(out.join("0000000015.json"), &sidecar[..sidecar.len() / 2]).unwrap();
-    // An older program's, which says nothing of its files' content.
+    // A sidecar of an older program, without checksums of its files.
     let mut older = json(&out.join("0000000017.json"));
     older.as_object_mut().unwrap().remove("file_crc32").unwrap();
     fs::write(out.join("0000000017.json"), older.to_string()).unwrap();
@@ -267,7 +267,7 @@ fn a_run_that_was_killed_goes_on() {
 
 #[test]
 #[cfg(unix)]
-fn an_interrupt_finishes_what_was_begun() {
+fn an_interrupt_finishes_the_images_at_work() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     prepare(at);
@@ -280,7 +280,7 @@ fn stopped_by(at: &Path, signal: &str) {
     let out = at.join(signal);
     let predict = format!("predict --model run {DRIVE} {SAVE} --out {signal}");
     let mut child = start(at, &predict);
-    // The manifest is there before the first image, and after the handler.
+    // The manifest is written before the first image, and after the handler is set.
     let manifest = out.join("predict-1-of-1.manifest.json");
     while !manifest.exists() && child.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(1));
@@ -298,7 +298,7 @@ fn stopped_by(at: &Path, signal: &str) {
             .filter(|image| image["state"] == state)
             .count()
     };
-    // It may have been done already.
+    // The run may have ended before the signal.
     assert_eq!(code, Some(if done("done") == 30 { 0 } else { 130 }));
     let names = outputs(&out);
     assert_eq!(names.len(), done("done") * 4, "{:?}", names.keys());
@@ -343,7 +343,7 @@ fn a_broken_image_is_named_and_the_others_are_done() {
 }
 
 #[test]
-fn what_is_there_is_kept_only_where_nothing_changed() {
+fn existing_outputs_are_kept_only_if_nothing_changed() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     prepare(at);
@@ -380,7 +380,7 @@ fn what_is_there_is_kept_only_where_nothing_changed() {
         fs::read(at.join("out/0000000003_depth.npy")).unwrap()
     );
 
-    // Files of somebody else.
+    // Files that this program did not write.
     fs::create_dir(at.join("other")).unwrap();
     fs::write(at.join("other/0000000005_depth.npy"), "mine").unwrap();
     fails(
@@ -400,9 +400,9 @@ fn the_pictures_of_a_recording_become_a_video() {
     let at = folder.path();
     prepare(at);
     let predict = "predict --model run sim --save video";
-    // Before any work: a shard has no video to show, and without ffmpeg there is none.
+    // Refused before any work: videos of a shard, and videos without ffmpeg.
     let shard = format!("{predict} --out out --shard 1/2");
-    fails(at, &shard, &["--save video", "a shard sees only some"]);
+    fails(at, &shard, &["--save video", "a shard has only some"]);
     let without = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
         .current_dir(at)
         .args(format!("{predict} --out out").split_whitespace())
@@ -420,7 +420,7 @@ fn the_pictures_of_a_recording_become_a_video() {
         eprintln!("skipped: there is no ffmpeg that could write a video");
         return;
     }
-    // Shards leave the pictures; one more run shows them.
+    // Shards write the pictures; one more run makes the video.
     for i in 1..=2 {
         let args =
             format!("predict --model run sim --save side-by-side,npy --out out --shard {i}/2");
@@ -431,7 +431,7 @@ fn the_pictures_of_a_recording_become_a_video() {
     let made = outputs(&at.join("out"));
     assert_eq!(made.len(), 30 * 3 + 1, "{:?}", made.keys());
     assert!(made[video].len() > 1000, "{:?}", made.keys());
-    // A video is a recording, too, once its camera is known: the drive's frames, the last one named twice.
+    // With a known camera, a video is a recording, too: the drive's frames, of which the last is named twice.
     fs::write(at.join("out/intrinsics.txt"), "50,50,48,32").unwrap();
     let inspected = ok(at, &format!("data inspect out/{video}"));
     assert!(
@@ -439,7 +439,7 @@ fn the_pictures_of_a_recording_become_a_video() {
         "{}",
         inspected.stdout
     );
-    // Made again it is the same; a file that nobody here made is not replaced unasked.
+    // Made again, it is the same; a file that this program did not write is not replaced unasked.
     ok(at, "predict --model run sim --save video,npy --out out");
     fs::create_dir(at.join("other")).unwrap();
     fs::write(at.join("other").join(video), "mine").unwrap();

@@ -1,4 +1,4 @@
-//! A camera from pictures of a board, through the program alone, and what reads the file that it writes. The pictures are those of
+//! A camera from pictures of a board, through the program, and the commands that read the file it writes. The pictures are those of
 //! `deepfusion-calibrate` (`tests/reference/boards.py`), whose camera is known.
 
 use std::fs;
@@ -12,7 +12,7 @@ fn boards() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../deepfusion-calibrate/tests/reference")
 }
 
-/// A folder with some of a camera's pictures in `pictures`.
+/// A folder with some pictures of a camera in `pictures`.
 fn folder(camera: &str, least: usize, most: usize) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("pictures")).unwrap();
@@ -35,7 +35,7 @@ const BOARD: &str = "--board 9x6 --square 0.025";
 fn a_camera_is_measured_and_its_file_undoes_the_lens() {
     let folder = folder("brown", 0, 9);
     let at = folder.path();
-    // A picture without a board is named, and no harm.
+    // A picture without a board is named and does no harm.
     let plain = image::RgbImage::from_pixel(400, 300, image::Rgb([90, 100, 110]));
     plain.save(at.join("pictures/wall.png")).unwrap();
     let report = json(
@@ -56,7 +56,7 @@ fn a_camera_is_measured_and_its_file_undoes_the_lens() {
     assert!(report["rms_px"].as_f64().unwrap() < 0.1);
     let page = fs::read_to_string(at.join("camera.html")).unwrap();
     assert!(page.contains("Where corners were seen") && page.contains("pictures/08.jpg"));
-    // Not twice over each other.
+    // The outputs are not written a second time over the first.
     let again = format!("calibrate pictures {BOARD} --out camera.yaml");
     fails(at, &again, &["camera.yaml", "--overwrite"]);
     let text = ok(at, &format!("{again} --overwrite")).stdout;
@@ -69,7 +69,7 @@ fn a_camera_is_measured_and_its_file_undoes_the_lens() {
         assert!(text.contains(line), "no `{line}` in\n{text}");
     }
 
-    // `predict` reads it, and says the camera of the corrected image: another one than that of the lens.
+    // `predict` reads the file, and records the camera of the corrected image, which differs from the lens's.
     ok(
         at,
         "predict --model tiny pictures/00.jpg --calib camera.yaml --out depth --save npy",
@@ -82,7 +82,7 @@ fn a_camera_is_measured_and_its_file_undoes_the_lens() {
         "{sidecar}"
     );
 
-    // Beside a drive's images it is found by its name. The folder above is looked into, too: so one deeper.
+    // Beside a drive's images the file is found by its name. The folder above is searched, too, hence one deeper.
     let drive = at.join("drives/one");
     fs::create_dir_all(drive.join("images")).unwrap();
     for number in 0..9 {
@@ -100,7 +100,7 @@ fn a_camera_is_measured_and_its_file_undoes_the_lens() {
     );
     fs::copy(at.join("camera.yaml"), drive.join("calibration.yaml")).unwrap();
     let inspected = json(at, "data inspect drives/one --json");
-    // The corrected image's camera, as `predict` says it.
+    // The corrected image's camera, as `predict` recorded it.
     close(&inspected["intrinsics"]["fx"], fx, 1e-6);
 }
 
@@ -128,7 +128,7 @@ fn a_fisheye_lens_is_measured() {
     );
 }
 
-/// The camera does not depend on the squares' size, and has a file by default.
+/// The camera does not depend on the squares' size, and its file has a default name.
 #[test]
 fn a_board_is_enough() {
     let root = folder("brown", 0, 9);
@@ -155,7 +155,7 @@ fn a_board_is_enough() {
     assert!(said.contains("in metres, not millimetres"), "{said}");
 }
 
-/// A file that says a size no image has: nothing is set aside for it.
+/// A file with an impossible image size: no memory is allocated for it.
 #[test]
 fn a_file_for_giant_images_is_an_error() {
     let root = folder("brown", 0, 1);
@@ -171,7 +171,7 @@ fn a_file_for_giant_images_is_an_error() {
 }
 
 #[test]
-fn what_goes_wrong_is_an_error_with_a_hint() {
+fn every_failure_is_an_error_with_a_hint() {
     let few = folder("brown", 0, 4);
     let at = few.path();
     fails(
@@ -200,7 +200,7 @@ fn what_goes_wrong_is_an_error_with_a_hint() {
         &format!("calibrate walls {BOARD} --out c.yaml"),
         &["found in 6 pictures", "10x7 squares has 9x6"],
     );
-    // Another size, and a picture that EXIF turns.
+    // A picture of another size, and one that EXIF rotates.
     fs::copy(boards().join("plain/00.jpg"), at.join("pictures/small.jpg")).unwrap();
     fails(
         at,
@@ -231,7 +231,7 @@ fn what_goes_wrong_is_an_error_with_a_hint() {
     );
 }
 
-/// A video of every picture four times over, some of them blurred: each pose is taken once.
+/// A video with every picture four times, some of them blurred: each pose is used once.
 #[test]
 fn a_videos_frames_are_picked() {
     for program in ["ffmpeg", "ffprobe"] {

@@ -1,4 +1,4 @@
-//! `--clock-offset auto`: a simulated drive whose camera runs ahead of its log by a time that is known.
+//! `--clock-offset auto`: a simulated drive whose camera's clock is ahead of its log's by a known time.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -19,7 +19,7 @@ struct Reading {
     yaw_radps: f64,
 }
 
-/// A simulated drive of ten frames a second: its images in `images`, when they were taken, and what the vehicle measured.
+/// A simulated drive at ten frames per second: its images in `images`, and the vehicle's measurement at each image's time.
 fn drive(at: &Path, frames: usize) -> Vec<Reading> {
     ok(
         at,
@@ -52,7 +52,7 @@ fn drive(at: &Path, frames: usize) -> Vec<Reading> {
     stamps.lines().enumerate().map(reading).collect()
 }
 
-/// A folder of the images, taken by a clock that is `ahead_s` ahead of the readings'.
+/// A folder of the images, with times of a clock that is `ahead_s` ahead of the readings'.
 fn folder(at: &Path, name: &str, readings: &[Reading], ahead_s: f64) {
     fs::create_dir(at.join(name)).unwrap();
     let mut frames = String::from("time_s,file\n");
@@ -64,7 +64,7 @@ fn folder(at: &Path, name: &str, readings: &[Reading], ahead_s: f64) {
     fs::write(at.join(name).join("dataset.toml"), config).unwrap();
 }
 
-/// How far the camera's clock is said to be ahead, and the standard error, milliseconds.
+/// How far the camera's clock is ahead as printed, and the standard error, in milliseconds.
 fn found(printed: &str) -> (f64, f64) {
     let line = printed
         .lines()
@@ -114,7 +114,7 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     }
     track += "</trkseg></trk></gpx>\n";
     for (name, ahead_s) in [("ahead", 0.24), ("behind", -0.31)] {
-        // A gyroscope needs less of the drive than a track.
+        // A gyroscope needs a shorter drive than a track.
         folder(at, name, &readings[..400], ahead_s);
         fs::write(at.join(name).join("speed.csv"), &table).unwrap();
         let printed = ok(at, &format!("data inspect {name} --clock-offset auto"));
@@ -124,7 +124,7 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     fs::write(at.join("track/track.gpx"), &track).unwrap();
     let printed = ok(at, "data inspect track --clock-offset auto");
     is_within(&printed.stderr, 240.0);
-    // A log that is imported: what was measured stands in its dataset.toml, and nothing is left to find.
+    // A log that is imported: the measured offset is written to its dataset.toml, and none remains.
     fs::copy(at.join("track/track.gpx"), at.join("track.gpx")).unwrap();
     let printed = ok(
         at,
@@ -155,13 +155,13 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
         "{config}"
     );
     fails(at, import, &["speed.csv: already exists"]);
-    // Clocks that were not set together are not one clock.
+    // Recordings with different offsets do not share a clock.
     fails(
         at,
         "data export-gt ahead behind --out gt.npz --clock-offset auto",
         &["those of the other drives", "one by one"],
     );
-    // One that shows nothing gets what the others show, unless it says something else.
+    // A recording whose offset cannot be measured gets that of the others, unless it states another.
     folder(at, "straight", &readings[..80], 0.24);
     let straight = readings[..80].iter().fold(
         String::from("time_s,speed_mps,yaw_rate_radps\n"),
@@ -169,12 +169,12 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     );
     fs::write(at.join("straight/speed.csv"), straight).unwrap();
     let both = "data export-gt ahead straight --out gt.npz --clock-offset auto";
-    // What was asked for is not there, but the clocks were measured first.
+    // The requested frame does not exist, but the clocks were measured first.
     let printed = run(at, both);
     assert!(
         printed
             .stderr
-            .contains("it gets what the other recordings show"),
+            .contains("using the offset of the other recordings"),
         "{}",
         printed.stderr
     );
@@ -201,7 +201,7 @@ fn an_offset_that_cannot_be_found_is_refused() {
         "data inspect straight --clock-offset auto",
         &["the motion does not change", "--clock-offset MS"],
     );
-    // A log whose clock cannot be measured becomes no drive.
+    // A log whose clock offset cannot be measured is not imported.
     fs::create_dir(at.join("drive")).unwrap();
     fs::copy(at.join("straight/frames.csv"), at.join("drive/frames.csv")).unwrap();
     fails(
@@ -209,7 +209,7 @@ fn an_offset_that_cannot_be_found_is_refused() {
         "data import straight/speed.csv --images images --hfov 80 --clock-offset auto --out drive",
         &["the motion does not change", "--clock-offset MS"],
     );
-    // Nor does the current folder.
+    // Nor into the current folder.
     fails(
         &at.join("drive"),
         "data import ../straight/speed.csv --images ../images --hfov 80 --clock-offset auto --out .",

@@ -1,4 +1,4 @@
-//! A run's report, its kept evaluations and their comparison, through the program alone.
+//! A run's report, its saved evaluations and their comparison, through the program.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::support::{self, fails, run};
 use serde_json::Value;
 
-/// What a run that must succeed prints.
+/// Output of a command that must succeed.
 fn ok(folder: &Path, args: &str) -> String {
     support::ok(folder, args).stdout
 }
@@ -43,7 +43,7 @@ fn runs_are_reported_kept_and_compared() {
         );
     }
 
-    // Points in space, and the page.
+    // The points in space, and the page.
     let printed = ok(
         at,
         "eval --model a --data sim --points 500 --points-seed 9 --report a.html --json",
@@ -73,11 +73,11 @@ fn runs_are_reported_kept_and_compared() {
     ] {
         assert!(html.contains(part), "{part}");
     }
-    // Six images were measured: two best, the median, two worst, four pictures each, and four of the clouds.
+    // Six images were evaluated: the two best, the median and the two worst with four pictures each, and four pictures of clouds.
     assert_eq!(report["n"], 6);
     assert_eq!(html.matches("data:image/jpeg").count(), 5 * 4 + 4);
 
-    // What was kept is what was printed of the ground truth; the verdict without it is not compared.
+    // The saved metrics are those printed for the ground truth; the verdict is not compared.
     let saved = kept(&at.join("a"));
     assert_eq!(saved.len(), 1);
     let mut measured = report.clone();
@@ -94,7 +94,7 @@ fn runs_are_reported_kept_and_compared() {
     assert_eq!(
         kept(&at.join("a")).len(),
         1,
-        "the same again replaces its file"
+        "repeating an evaluation replaces its file"
     );
 
     // Side by side.
@@ -125,14 +125,14 @@ fn runs_are_reported_kept_and_compared() {
     let sheet = fs::read(at.join("c.png")).unwrap();
     assert!(sheet.starts_with(b"\x89PNG"));
 
-    // Training on makes other weights of the same name.
+    // Continued training writes other weights under the same name.
     fs::write(at.join("a/best.safetensors"), "other").unwrap();
     assert!(ok(at, "compare a").contains("has changed since"));
 
     fails(
         at,
         "compare a printed.json --pictures sim --out d.html",
-        &["pictures need a run's folder"],
+        &["expected a run's folder for the pictures"],
     );
     fs::write(at.join("broken.json"), &printed[..printed.len() / 2]).unwrap();
     fails(at, "compare broken.json", &["no evaluation"]);

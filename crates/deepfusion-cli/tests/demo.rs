@@ -1,16 +1,16 @@
-//! The demo, made short by options that its help does not show.
+//! The demo, shortened by options that its help does not show.
 
 use std::fs;
 use std::path::Path;
 
 use crate::support::{fails, json, ok, run};
 
-/// Whether this build embeds the network that the demo shows.
+/// Whether this build embeds the network of the demo.
 fn has_network() -> bool {
     deepfusion_weights::names().any(|name| name == deepfusion_weights::DEFAULT)
 }
 
-/// Files that a demo leaves, each with something in it.
+/// Asserts that the files of a demo exist and are not empty.
 fn are_there(demo: &Path, files: &[&str]) {
     for file in files {
         let length = fs::metadata(demo.join(file)).map_or(0, |file| file.len());
@@ -18,7 +18,7 @@ fn are_there(demo: &Path, files: &[&str]) {
     }
 }
 
-/// Zero-shot and after learning: pictures, a cloud, targets and the report. What is there stays there.
+/// Zero-shot and after training: pictures, a cloud, targets and the report. Existing files are not replaced.
 #[test]
 fn the_demo_shows_the_embedded_network_and_what_learning_adds() {
     if !has_network() {
@@ -39,7 +39,7 @@ fn the_demo_shows_the_embedded_network_and_what_learning_adds() {
     ] {
         assert!(run.stderr.contains(said), "{said}: {}", run.stderr);
     }
-    // Learned from seven of twelve frames, measured on the last four.
+    // Trained on seven of twelve frames, evaluated on the last four.
     let split = |name: &str| fs::read_to_string(at.join("first").join(name)).unwrap();
     assert_eq!(split("learned.txt").lines().count(), 7);
     assert_eq!(split("measured.txt").lines().count(), 4);
@@ -60,7 +60,7 @@ fn the_demo_shows_the_embedded_network_and_what_learning_adds() {
         ],
     );
     let targets = split("targets/targets.jsonl");
-    assert_eq!(targets.lines().count(), 12, "every frame is looked at");
+    assert_eq!(targets.lines().count(), 12, "every frame has targets");
     let report = split("report.html");
     for word in ["Abs Rel zero-shot", "after learning", "mean-depth baseline"] {
         assert!(report.contains(word), "{word}");
@@ -88,12 +88,12 @@ fn the_demo_from_scratch_ends_in_a_report() {
             "report.html",
         ],
     );
-    // A drive that is too short to be measured on.
+    // A drive that is too short to evaluate on.
     let few = run(at, "demo --out few --frames 11");
     assert_eq!(few.code, 2, "{}", few.stderr);
 }
 
-/// Ctrl-C while the drive is simulated: nothing half-written stays, and the folder can be used again.
+/// Ctrl-C while the drive is simulated: no half-written files remain, and the folder can be used again.
 #[test]
 #[cfg(unix)]
 fn the_demo_can_be_stopped_while_it_simulates() {
@@ -126,5 +126,5 @@ fn the_demo_can_be_stopped_while_it_simulates() {
         assert!(said.contains(part), "{said}");
     }
     let left = fs::read_dir(at.join("stopped")).unwrap().count();
-    assert_eq!(left, 0, "it did not go on to the end of the drive");
+    assert_eq!(left, 0, "it stopped before the end of the drive");
 }

@@ -1,4 +1,4 @@
-//! What `doctor` prints: a line for each check, whatever came of it.
+//! The output of `doctor`: a line for each check, whatever its result.
 
 use std::fs;
 
@@ -35,7 +35,7 @@ fn lines(text: &str) -> Vec<(&str, &str)> {
 }
 
 #[test]
-fn every_check_has_a_line_that_says_whether_it_was_made() {
+fn every_check_has_a_line_with_its_result() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -48,7 +48,7 @@ fn every_check_has_a_line_that_says_whether_it_was_made() {
     assert_eq!(names, CHECKS, "{text}");
     let line = |name: &str| printed.iter().find(|(n, _)| *n == name).unwrap().1;
     assert!(line("timing").ends_with(" ok"), "{text}");
-    // Without a LiDAR nothing says that it is in order.
+    // Without a LiDAR its check is not ok, but skipped.
     assert!(
         line("lidar-speed").contains("not checked: no LiDAR"),
         "{text}"
@@ -72,7 +72,7 @@ fn every_check_has_a_line_that_says_whether_it_was_made() {
     }
     let page = fs::read_to_string(at.join("page.html")).unwrap();
     assert!(page.contains("not checked: no LiDAR"));
-    // What cannot be opened could not be checked either.
+    // A recording that cannot be opened cannot be checked.
     fs::create_dir(at.join("empty")).unwrap();
     let text = run(at, "doctor empty").stdout;
     let names: Vec<&str> = lines(&text).iter().map(|(name, _)| *name).collect();
@@ -84,7 +84,7 @@ fn every_check_has_a_line_that_says_whether_it_was_made() {
     assert_eq!(report["checks"].as_array().unwrap().len(), CHECKS.len());
 }
 
-/// The processor beside itself: every operation is there, and right to the last bit.
+/// The processor compared with itself: every operation is listed, and equal to the last bit.
 #[cfg(feature = "train")]
 #[test]
 fn a_device_is_compared_with_the_processor() {
@@ -101,7 +101,7 @@ fn a_device_is_compared_with_the_processor() {
         assert_eq!(operation["right"], true, "{operation}");
         assert_eq!(operation["forward"], 0.0, "{operation}");
     }
-    // What another process answers for a GPU: a line for each operation from one on.
+    // The answer of the process that checks a GPU: a line for each operation from the given one on.
     let answers = ok(at, "doctor --device cpu --operations-from optimiser");
     let answers: Vec<serde_json::Value> = answers
         .stdout
@@ -113,7 +113,7 @@ fn a_device_is_compared_with_the_processor() {
         assert_eq!(answer["forward"], 0.0, "{answer}");
         assert!(answer["failure"].is_null(), "{answer}");
     }
-    // This build has no GPU's backend: `auto` is the processor, and a GPU by name is answered with how to build it.
+    // This build has no GPU backend: `auto` is the processor, and naming a GPU gives the hint how to build with one.
     ok(at, "doctor --device auto --operations-from optimiser");
     fails(
         at,
@@ -125,7 +125,7 @@ fn a_device_is_compared_with_the_processor() {
     assert!(unknown.stderr.contains("cpu, auto"), "{}", unknown.stderr);
 }
 
-/// A folder is as good as its good drives: one that stands and one of a single frame are left out and named.
+/// A folder is judged by its good drives: a drive that stands still and one of a single frame are left out and named.
 #[test]
 fn a_drive_that_cannot_train_does_not_fail_its_folder() {
     let folder = tempfile::tempdir().unwrap();
@@ -199,7 +199,7 @@ fn a_drive_that_cannot_train_does_not_fail_its_folder() {
     let measured = json(at, "eval --model run --data all --json");
     assert_eq!(measured["n"], 7, "three of two drives, and one");
     ok(at, "eval-odometry --model run --data all --json");
-    // Alone, such a drive has nothing to teach.
+    // By itself, such a drive cannot be trained on.
     let alone = run(at, &format!("doctor all/2026_01_01/{single}"));
     assert_eq!(alone.code, 1);
     assert!(
@@ -214,10 +214,10 @@ fn a_drive_that_cannot_train_does_not_fail_its_folder() {
     );
 }
 
-/// The camera's numbers are those of images half as large: whoever takes them says so, without being asked.
+/// The intrinsics are those of images half the size: every command that uses them warns.
 #[cfg(feature = "train")]
 #[test]
-fn a_camera_of_another_size_is_warned_of_by_every_command() {
+fn every_command_warns_of_a_camera_of_another_size() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -264,7 +264,7 @@ fn a_camera_of_another_size_is_warned_of_by_every_command() {
     }
 }
 
-/// What `doctor` says of a log by itself: its findings' checks, texts and hints.
+/// The findings of `doctor` about a log by itself: checks, texts and hints.
 fn of_log(at: &std::path::Path, arguments: &str) -> Vec<(String, String, String)> {
     let text = run(at, &format!("doctor {arguments} --json")).stdout;
     let report: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -331,7 +331,7 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
         "no column looks like",
         "--speed COLUMN",
     );
-    // A camera's own log, in a file that is no whole video.
+    // A camera's own log, in an incomplete video file.
     says(
         "gopro.mp4",
         "log",
@@ -341,7 +341,7 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
     let printed = run(&at, &format!("doctor vector.blf {can}"));
     assert_eq!(printed.code, 0, "{}", printed.stderr);
     assert_eq!(run(&at, "doctor vector.blf").code, 1);
-    // A log has no camera and no picture.
+    // A log has no camera and no images.
     for option in ["--hfov 60", "--clock-offset auto", "--report page.html"] {
         let name = option.split(' ').next().unwrap();
         let printed = run(&at, &format!("doctor phone.gpx {option}"));

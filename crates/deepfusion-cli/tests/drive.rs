@@ -1,4 +1,4 @@
-//! From a simulated drive to numbers, through the program alone.
+//! From a simulated drive to metrics, through the program.
 
 use std::path::Path;
 
@@ -58,7 +58,7 @@ fn a_simulated_drive_is_inspected_exported_and_scored() {
         .unwrap();
     assert_eq!(exported.iter().copied().collect::<Vec<_>>(), depth.data);
 
-    // The truth, filled where it has none, 10 % too far: known numbers.
+    // The ground truth, filled where it has none and 10 % too far, has known metrics.
     derive(at, "gt.npz", "far.npz", |a| {
         a.mapv(|d| if d > 0.0 { 1.1 * d } else { 30.0 })
     });
@@ -114,9 +114,9 @@ fn a_simulated_drive_is_inspected_exported_and_scored() {
     );
 }
 
-/// People who move have KITTI's names among the labels; without the option there are none.
+/// Riders and pedestrians have KITTI's class names in the labels; without the option there are none.
 #[test]
-fn people_ride_and_walk_where_they_are_asked_for() {
+fn people_ride_and_walk_if_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let labels = |options: &str| {
@@ -135,9 +135,9 @@ fn people_ride_and_walk_where_they_are_asked_for() {
     assert!(!is_named(&labels("--out without")));
 }
 
-/// A varied drive says what was drawn, in its folder and as JSON; what is drawn cannot be asked for.
+/// A varied drive records what was drawn, in its folder and as JSON; options cannot set what is drawn.
 #[test]
-fn a_varied_drive_says_what_was_drawn() {
+fn a_varied_drive_records_what_was_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let small = "simulate --frames 1 --size 64x48 --scan-every 0 --scene country --json";
@@ -184,9 +184,9 @@ fn a_varied_drive_says_what_was_drawn() {
     }
 }
 
-/// How many cars drive stands in the JSON, and a warning says where they are fewer than were asked for.
+/// The JSON has the number of cars that drive, and a warning says if they are fewer than asked for.
 #[test]
-fn cars_that_a_varied_street_stops_are_warned_of() {
+fn a_varied_street_that_blocks_cars_gives_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for (seed, varied) in [(1, ""), (1, "--varied"), (2, "--varied")] {
@@ -204,7 +204,7 @@ fn cars_that_a_varied_street_stops_are_warned_of() {
     }
 }
 
-/// Velocities stand beside the depths and are never taken for some.
+/// Velocities are exported beside depths and never mistaken for them.
 #[test]
 fn a_bag_s_velocities_are_exported_beside_its_depths() {
     let folder = tempfile::tempdir().unwrap();
@@ -236,7 +236,7 @@ fn a_bag_s_velocities_are_exported_beside_its_depths() {
     let depths = names.iter().filter(|n| !n.contains('/')).count();
     assert!(depths > 2 && names.len() == 2 * depths, "{names:?}");
 
-    // What reads the file back as depths leaves the velocities out.
+    // Reading the file back as depths leaves the velocities out.
     let mut writer = NpzWriter::new(std::fs::File::create(at.join("pred.npz")).unwrap());
     for name in names.iter().filter(|n| !n.contains('/')) {
         let everywhere = Array2::<f32>::from_elem((72, 96), 10.0);

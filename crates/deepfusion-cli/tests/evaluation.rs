@@ -1,4 +1,4 @@
-//! What a trained model sees of moving things, and the path its pose network takes, through the program alone.
+//! A trained model's depth on dynamic objects and its pose network's trajectory, through the program.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ use deepfusion_train::{DataConfig, DataSetConfig, RunFolder, TrainConfig};
 use serde_json::Value;
 
 #[test]
-fn a_model_is_measured_on_traffic_and_along_the_road() {
+fn a_model_is_evaluated_on_traffic_and_along_the_road() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -35,7 +35,7 @@ fn a_model_is_measured_on_traffic_and_along_the_road() {
 
     let odometry = "eval-odometry --model run --data sim";
     let printed = ok(at, &format!("{odometry} --out paths --json"));
-    // The camera trained with: nothing to warn of.
+    // The camera is the training camera: no warning.
     assert!(
         !printed.stderr.contains("focal length"),
         "{}",
@@ -51,7 +51,7 @@ fn a_model_is_measured_on_traffic_and_along_the_road() {
     assert_eq!(lengths.is_empty(), distance <= 10.0);
     assert_eq!(report["t_rel_percent"].is_f64(), distance > 10.0);
 
-    // What was written scores the same as what was computed, in both formats.
+    // The written trajectory has the same scores as the computed one, in both formats.
     let name = "2026_01_01_drive_0003_sync";
     for kind in ["txt", "tum"] {
         let files = format!("--pred {name}_predicted.{kind} --gt {name}_truth.{kind}");
@@ -67,7 +67,7 @@ fn a_model_is_measured_on_traffic_and_along_the_road() {
     let truth = PoseFile::read(&at.join(format!("paths/{name}_truth.tum"))).unwrap();
     assert_eq!(truth.poses.len(), truth.times_s.len());
 
-    // Without the exact poses the truth is the path that OXTS gives: the same road, to a few per mille.
+    // Without the exact poses the truth is OXTS's path, which agrees to a few per mille.
     let poses = at.join(format!("sim/2026_01_01/{name}/poses.txt"));
     fs::rename(&poses, at.join("poses.txt")).unwrap();
     let oxts = json(at, &format!("{odometry} --out oxts --json"));
@@ -78,7 +78,7 @@ fn a_model_is_measured_on_traffic_and_along_the_road() {
     assert!((off["scale"].as_f64().unwrap() - 1.0).abs() < 2e-3, "{off}");
 }
 
-/// Post-processing, points as a table, and depth images in the place of scans.
+/// Post-processing, points as a table, and depth images instead of scans.
 #[test]
 fn the_protocols_of_the_fields_tables() {
     let folder = tempfile::tempdir().unwrap();
@@ -106,7 +106,7 @@ fn the_protocols_of_the_fields_tables() {
         .iter()
         .filter(|text| text.contains(r#""post_process": "flip""#));
     assert_eq!(post_processed.count(), 1);
-    // It learned one camera at one size; an embedded network takes any.
+    // It was trained with one camera at one size; an embedded network takes any.
     fails(
         at,
         &format!("{eval} --post-process multi-scale"),
@@ -122,7 +122,7 @@ fn the_protocols_of_the_fields_tables() {
         );
     }
 
-    // Of scans every second frame, of depth images all; the simulator's are exact, and the same camera z.
+    // Every second frame has a scan, every frame a depth image; the simulator's are exact, and camera z as well.
     let annotated = json(at, &format!("{eval} --gt-depth annotated"));
     assert_eq!((&plain["n"], &annotated["n"]), (&2.into(), &4.into()));
     assert_eq!(annotated["protocol"]["gt"], "annotated");
@@ -214,7 +214,7 @@ fn poses_that_cannot_be_compared_are_errors() {
     assert!(table.contains("no stretches of 10 m"), "{table}");
 }
 
-/// Two data sets in one run: from then on metres are one of theirs, and which one has to be said.
+/// Two data sets in one run: each has its own scale, so the one to use must be named.
 #[test]
 fn several_data_sets_are_learned_together() {
     let folder = tempfile::tempdir().unwrap();
@@ -273,7 +273,7 @@ fn several_data_sets_are_learned_together() {
         );
         report["unscaled"]["abs_rel"].as_f64().unwrap()
     };
-    // Another range and another focal length: other metres.
+    // Another depth range and another focal length give other metres.
     assert_ne!(scale("road"), scale("yard"));
     let ratio = |set: &str| {
         let args = format!("eval-odometry --model both --data road --set {set} --json");

@@ -8,7 +8,7 @@ use deepfusion_onnx::{OPSET, read};
 use serde_json::Value;
 
 #[test]
-fn a_run_becomes_a_file_that_is_its_network() {
+fn an_exported_file_computes_what_the_network_does() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for args in [
@@ -65,7 +65,7 @@ fn a_run_becomes_a_file_that_is_its_network() {
     assert_eq!(wide.graph, model.graph);
     assert_eq!(wide.trained_with, model.trained_with);
 
-    // Nothing is overwritten unasked, and a failure leaves nothing behind.
+    // No file is overwritten unasked, and a failure leaves no files behind.
     fs::write(at.join("text.so"), "no library").unwrap();
     let files = || {
         let mut names: Vec<_> = fs::read_dir(at)

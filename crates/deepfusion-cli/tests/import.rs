@@ -1,4 +1,4 @@
-//! A drive whose speeds an app has logged: through `data import`, and read where it lies.
+//! A drive whose speeds an app has logged: imported with `data import`, and read in place.
 
 use std::fs;
 use std::path::Path;
@@ -8,8 +8,8 @@ use serde_json::Value;
 
 const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0003_sync";
 
-/// A simulated drive's images, when they were taken, and its speeds as Torque writes them: the log's lines, and what the drive itself
-/// says.
+/// A simulated drive's images with their times, and its speeds as Torque writes them: the log's lines, and the inspection of the drive
+/// itself.
 fn write_drive(at: &Path) -> (Vec<String>, Value) {
     ok(
         at,
@@ -79,7 +79,7 @@ fn a_log_beside_its_images_is_a_drive() {
     let pairs = imported["drives"][0]["usable_pairs"].as_u64().unwrap();
     assert!(pairs >= 20, "{imported}");
 
-    // The same log in the place of speed.csv, by dataset.toml alone; its clock is taken for UTC, so the frames are moved.
+    // The same log instead of speed.csv, by dataset.toml alone; its clock is taken for UTC, so the frames are shifted.
     fs::create_dir(at.join("beside")).unwrap();
     fs::copy(at.join("frames.csv"), at.join("beside/frames.csv")).unwrap();
     let config = "images = \"../images\"\nspeed = \"../torque.csv\"\nintrinsics = [92.95, 184.71, 78.09, 43.88]\nstart_s = 1767272400.0\n";
@@ -101,7 +101,7 @@ fn a_log_beside_its_images_is_a_drive() {
     assert!(printed.stdout.contains("fx 46.19"), "{}", printed.stdout);
     assert!(!printed.stderr.contains("radians"), "{}", printed.stderr);
     let in_radians = ok(at, "data inspect beside --hfov 1.2").stderr;
-    assert!(in_radians.contains("--hfov 69, if"), "{in_radians}");
+    assert!(in_radians.contains("--hfov 69 if"), "{in_radians}");
 
     fails(at, &format!("{import} --out drive"), &["speed.csv"]);
     fails(
@@ -109,7 +109,11 @@ fn a_log_beside_its_images_is_a_drive() {
         "data import torque.csv --video none.mp4 --out x",
         &["none.mp4"],
     );
-    fails(at, "data import torque.csv --out x", &["neither a video"]);
+    fails(
+        at,
+        "data import torque.csv --out x",
+        &["no video and no images"],
+    );
     fs::write(at.join("torque.csv"), log.join("\n").replace("(km/h)", "")).unwrap();
     fails(
         at,

@@ -1,4 +1,4 @@
-//! Int8: calibrated on the user's images, refused where that is missing or stale, near f32 where it is there.
+//! Int8: calibrated on the user's images, refused if the calibration is missing or stale, close to f32 otherwise.
 
 use std::fs;
 
@@ -15,7 +15,7 @@ fn a_network_is_calibrated_and_measured_in_int8() {
         at,
         "simulate --out sim --frames 6 --seed 3 --scan-every 2 --size 320x96",
     );
-    // From the embedded network: its depth is good enough that int8 can harm it.
+    // The embedded network's depth is good enough to be harmed by int8.
     ok(
         at,
         "train --data sim --preset tiny --size 320x96 --batch 2 --steps 1 --set learning_rate=1e-6 --out run",
@@ -54,7 +54,7 @@ fn a_network_is_calibrated_and_measured_in_int8() {
         .filter(|step| step[0].as_str().unwrap().ends_with(" int8"));
     assert!(count.count() > 15, "{report}");
 
-    // A packed network takes its ranges along; a file's card takes them up.
+    // A packed network's card contains the ranges.
     ok(at, "weights pack --model run --name hut --out packed");
     let model = "--model packed/hut.safetensors";
     let packed = json(
@@ -71,7 +71,7 @@ fn a_network_is_calibrated_and_measured_in_int8() {
     ok(at, &format!("{CALIBRATE} {model} sim"));
     ok(at, &predict);
 
-    // Ranges of another step are not this one's.
+    // Ranges of another step are refused.
     let stale = fs::read_to_string(at.join("run/int8.toml")).unwrap();
     fs::write(
         at.join("run/int8.toml"),
@@ -81,7 +81,7 @@ fn a_network_is_calibrated_and_measured_in_int8() {
     fails(at, &format!("{eval} int8"), &["not calibrated"]);
     fs::write(at.join("run/int8.toml"), "step = 1").unwrap();
     fails(at, &format!("{eval} int8"), &["int8.toml"]);
-    // Of no account to others, and written anew.
+    // Other engines ignore them, and they can be written again.
     ok(at, &format!("{eval} f32"));
     fails(
         at,
@@ -90,13 +90,13 @@ fn a_network_is_calibrated_and_measured_in_int8() {
     );
     ok(at, &format!("{CALIBRATE} --model run sim"));
     ok(at, &format!("{eval} int8"));
-    // What was predicted with another calibration is another prediction.
+    // A prediction with another calibration counts as a different one.
     ok(at, &format!("{CALIBRATE} {model} sim --most-deviation 1"));
     fails(at, &predict, &["depth"]);
 }
 
 #[test]
-fn what_cannot_be_calibrated_is_said() {
+fn what_cannot_be_calibrated_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::create_dir(at.join("empty")).unwrap();
@@ -114,7 +114,7 @@ fn what_cannot_be_calibrated_is_said() {
     assert_eq!(none.code, 2, "{}", none.stderr);
 }
 
-/// Where the default network is embedded it needs no calibration of the user's.
+/// The embedded default network needs no calibration by the user.
 #[test]
 fn embedded_networks_come_calibrated() {
     if !Engine::has_int8() {

@@ -1,4 +1,4 @@
-//! KITTI's odometry benchmark through the program: what the other layouts share is tested in `deepfusion-data`.
+//! KITTI's odometry benchmark through the program. The other layouts are tested in `deepfusion-data`.
 
 use std::collections::HashMap;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::support::{json, ok};
 
-/// The simulator's drive below `sim` as sequence 09 below `odometry`.
+/// Writes the simulator's drive below `sim` as sequence 09 below `odometry`.
 fn as_sequence(at: &Path, frames: usize) {
     let date = at.join("sim/2026_01_01");
     let drive = date.join("2026_01_01_drive_0003_sync");
@@ -42,18 +42,18 @@ fn as_sequence(at: &Path, frames: usize) {
     let tr = [row(0), row(1), row(2)].concat().join(" ");
     let calib = format!("P2: {}\nTr: {tr}\n", cameras["P_rect_02"].join(" "));
     fs::write(sequence.join("calib.txt"), calib).unwrap();
-    // The simulator's time stamps, whose hour is noon.
+    // The simulator's time stamps begin at noon.
     let stamps = fs::read_to_string(drive.join("image_02/timestamps.txt")).unwrap();
     let seconds = stamps.lines().map(|l| l.rsplit_once(':').unwrap().1);
     let times: String = seconds.map(|s| format!("{s}\n")).collect();
     fs::write(sequence.join("times.txt"), times).unwrap();
-    // The poses are camera 2's, 6 cm beside camera 0, which a street's turns do not tell from it.
+    // The poses are camera 2's, 6 cm beside camera 0: too close for the street's turns to distinguish.
     fs::create_dir_all(at.join("odometry/poses")).unwrap();
     fs::copy(drive.join("poses.txt"), at.join("odometry/poses/09.txt")).unwrap();
 }
 
 #[test]
-fn a_sequence_is_learned_from_measured_and_followed() {
+fn a_sequence_is_trained_on_and_evaluated() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -61,7 +61,7 @@ fn a_sequence_is_learned_from_measured_and_followed() {
         "simulate --out sim --frames 16 --seed 3 --scan-every 4 --size 160x96",
     );
     as_sequence(at, 16);
-    // As Monodepth2 names sequence 09.
+    // Sequence 09 as Monodepth2 names it.
     let lines: String = (1..15).map(|n| format!("9 {n} l\n")).collect();
     fs::write(at.join("train.txt"), lines).unwrap();
     fs::write(at.join("test.txt"), "9 4 l\n9 8 l\n").unwrap();
@@ -74,7 +74,7 @@ fn a_sequence_is_learned_from_measured_and_followed() {
     let raw = json(at, "data inspect sim --json");
     assert_eq!(inspected["kind"], "kitti_odometry");
     assert_eq!(inspected["drives"][0]["scans"], 4);
-    // The way by the poses' slopes is that by the simulator's oxts.
+    // The distance from the derivative of the poses agrees with the simulator's OXTS.
     for field in ["distance_m", "duration_s"] {
         let [a, b] = [&inspected, &raw].map(|seen| seen[field].as_f64().unwrap());
         assert!((a / b - 1.0).abs() < 3e-3, "{field}: {a} and {b}");
@@ -84,7 +84,7 @@ fn a_sequence_is_learned_from_measured_and_followed() {
         &format!("eval --model run {data} --split test.txt --strict --json"),
     );
     assert_eq!((&report["n"], &report["expected"]), (&2.into(), &2.into()));
-    // The same drive followed in either layout: the truth is the same path.
+    // In either layout, the true path is the same.
     let odometry = "eval-odometry --model run --json --data";
     let own = json(at, &format!("{odometry} odometry"));
     let exact = json(at, &format!("{odometry} sim"));
@@ -100,9 +100,9 @@ fn a_sequence_is_learned_from_measured_and_followed() {
     assert_eq!(sidecars[0]["intrinsics_from"], "recording");
 }
 
-/// What is not read with the drives is about their folder, and about none of them.
+/// A warning about files that are not read names the folder, not one of its drives.
 #[test]
-fn what_is_passed_over_is_said_of_the_folder() {
+fn files_that_are_not_read_are_reported_for_the_folder() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(at, "simulate --out sim --frames 6 --size 96x64");

@@ -1,4 +1,4 @@
-//! A drive of which nobody knows the camera: learned from, and the network used on it.
+//! A drive with an unknown camera: trained on, and predicted with the trained network.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::support::{self, fails, json, ok};
 use serde_json::Value;
 
-/// The drive of a simulated KITTI folder as images with speeds and yaw rates, and nothing of the camera.
+/// A simulated KITTI drive as images with speeds and yaw rates, without a calibration.
 fn without_camera(kitti: &Path, folder: &Path) {
     let drive = kitti.join("2026_01_01/2026_01_01_drive_0003_sync");
     fs::create_dir_all(folder.join("images")).unwrap();
@@ -38,7 +38,7 @@ fn read(path: &Path) -> Value {
 }
 
 #[test]
-fn a_drive_without_a_camera_is_learned_from_and_looked_at() {
+fn a_drive_without_a_calibration_is_trained_on_and_predicted() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -46,7 +46,7 @@ fn a_drive_without_a_camera_is_learned_from_and_looked_at() {
         "simulate --out sim --frames 16 --fps 5 --seed 3 --size 320x96 --scan-every 0",
     );
     without_camera(&at.join("sim"), &at.join("drive"));
-    // Whoever is stopped by a missing camera gets this way as the last hint, after one that every command takes.
+    // The error of a missing camera ends its hint with this option, after those that every command has.
     for command in ["data inspect drive", "train --data drive --steps 2"] {
         let ways = ["hfov_deg = 70", "calibration.yaml", "--intrinsics learn"];
         fails(at, command, &ways);
@@ -60,7 +60,7 @@ fn a_drive_without_a_camera_is_learned_from_and_looked_at() {
     fails(
         at,
         "train --data sim --intrinsics learn --steps 2",
-        &["its camera is known", "leave --intrinsics learn out"],
+        &["its camera is known", "leave out --intrinsics learn"],
     );
 
     let train = "train --data drive --preset tiny --size 96x64 --batch 2 --init none --steps 2";
@@ -84,7 +84,7 @@ fn a_drive_without_a_camera_is_learned_from_and_looked_at() {
     assert_eq!(found["learned_camera"]["focal_px"][0].as_float(), Some(fx));
     ok(at, "train --out run --resume --intrinsics learn --steps 3");
 
-    // The recording has no camera: the learned one is taken, and said to be no knowledge.
+    // The recording has no calibration: the learned camera is used, and recorded as not known.
     let predicted = ok(at, "predict --model run/last.safetensors drive --out depth");
     assert!(predicted.stderr.contains("learned"), "{}", predicted.stderr);
     let sidecar = read(&at.join("depth/0000000003.json"));
@@ -101,14 +101,14 @@ fn a_drive_without_a_camera_is_learned_from_and_looked_at() {
         (used / last - 1.0).abs() < 1e-9 && last != fx,
         "{used} {last} {fx}"
     );
-    // One that is given is known.
+    // A camera that is given is known.
     ok(
         at,
         "predict --model run drive --intrinsics 186,185,157,44 --out given",
     );
     let given = read(&at.join("given/0000000003.json"));
     assert_eq!(given["camera_known"], true);
-    // A picture of somewhere is taken to be of this camera.
+    // A picture of unknown origin is assumed to be from this camera.
     ok(
         at,
         "predict --model run drive/images/0000000003.png --out picture",
@@ -122,13 +122,13 @@ fn a_drive_without_a_camera_is_learned_from_and_looked_at() {
         "eval --model run/last.safetensors --data drive --assume-unseen --json",
     );
     let focal_px = report["checkpoint"]["learned_camera"]["focal_px"][0].as_f64();
-    // JSON's readers may be off by the last digit.
+    // JSON parsers may differ in the last digit.
     assert!(
         focal_px.is_some_and(|f| (f - last).abs() < 1e-9),
         "{focal_px:?} {last}"
     );
 
-    // A network whose run knew its cameras has none to lend.
+    // A network whose run had calibrated cameras has no learned one.
     ok(
         at,
         "train --data sim --preset tiny --size 96x64 --batch 2 --init none --steps 1 --out known",

@@ -1,5 +1,5 @@
-//! Live sources through the program alone: streams on standard input and of a server in this test. What needs ffmpeg is
-//! skipped, and says so, where there is none.
+//! Live sources through the program: streams on standard input and from a server in this test. Tests that need ffmpeg are
+//! skipped with a message if it is missing.
 
 use std::io::Write;
 use std::net::TcpListener;
@@ -21,7 +21,7 @@ fn there_is_ffmpeg() -> bool {
     there
 }
 
-/// A network that has seen a few steps of a street.
+/// A network trained for a few steps on a street.
 fn network(folder: &Path) {
     for args in [
         "simulate --out street --frames 6 --seed 5 --size 320x96",
@@ -46,7 +46,7 @@ fn files(folder: &Path) -> Vec<String> {
     names
 }
 
-/// The lines of `targets.jsonl`; every file beside it is whole.
+/// The lines of `targets.jsonl`; asserts that every file beside it is complete.
 fn whole(folder: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(folder.join("targets.jsonl")).unwrap();
     let lines: Vec<Value> = text
@@ -82,7 +82,7 @@ fn number(line: &Value) -> u64 {
 }
 
 #[test]
-fn a_source_that_is_too_fast_loses_frames_and_no_time() {
+fn frames_of_a_source_that_is_too_fast_are_skipped_without_delay() {
     if !there_is_ffmpeg() {
         return;
     }
@@ -104,7 +104,7 @@ fn a_source_that_is_too_fast_loses_frames_and_no_time() {
         assert!(line["latency_ms"].as_f64().unwrap() > 0.0);
         assert!(line["arrived_unix_s"].as_f64().unwrap() > 1.7e9);
         assert_eq!(line["speed_mps"], 5.0);
-        // A frame's picture is that of its number, and depth was made of no other.
+        // A frame's picture has its number, and depth was predicted from that picture.
         let name = line["frame"].as_str().unwrap();
         let picture = image::open(at.join(format!("seen/{name}_image.jpg")))
             .unwrap()
@@ -116,9 +116,9 @@ fn a_source_that_is_too_fast_loses_frames_and_no_time() {
         );
     }
     let last = lines.last().unwrap();
-    assert_eq!(number(last), SENT as u64 - 1, "the newest is looked at");
+    assert_eq!(number(last), SENT as u64 - 1, "the newest frame is used");
     assert!(last["dropped"].as_u64().unwrap() > 0, "{last}");
-    // Straight on, as long as it took to arrive.
+    // Straight ahead, for the time that it took to arrive.
     let forward = last["camera_motion"][11].as_f64().unwrap();
     let took =
         last["arrived_unix_s"].as_f64().unwrap() - lines[0]["arrived_unix_s"].as_f64().unwrap();
@@ -131,7 +131,7 @@ fn a_source_that_is_too_fast_loses_frames_and_no_time() {
         "{}",
         printed.stderr
     );
-    // Frames of another run would stand between these.
+    // Frames of another run would be mixed with these.
     let again = piped(at, &args, stream(2));
     assert_eq!(again.code, 1);
     assert!(
@@ -145,7 +145,7 @@ fn a_source_that_is_too_fast_loses_frames_and_no_time() {
 }
 
 #[test]
-fn depth_of_a_stream_stops_where_it_is_told() {
+fn prediction_of_a_stream_stops_at_the_given_frame() {
     if !there_is_ffmpeg() {
         return;
     }
@@ -175,7 +175,7 @@ fn depth_of_a_stream_stops_where_it_is_told() {
     assert_eq!(files.len(), 9, "{files:?}");
     assert!(files.contains(&"live_video.mp4".to_owned()), "{files:?}");
 
-    // Frames of a shape that the network learned nothing like, and sees whole: either command warns of them once.
+    // Frames of a shape unlike any in training, which the network sees whole: both commands warn of them once.
     for command in ["predict", "perceive"] {
         let args = format!(
             "{command} --model run - --intrinsics 500,500,479.5,31.5 --stretch --out odd-{command}"
@@ -189,14 +189,14 @@ fn depth_of_a_stream_stops_where_it_is_told() {
 }
 
 #[test]
-fn what_was_seen_before_the_connection_was_lost_is_kept() {
+fn frames_before_the_connection_was_lost_are_kept() {
     if !there_is_ffmpeg() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     network(at);
-    // The server is there, and sends no more.
+    // The server stays connected, but sends no more.
     let (stop, until) = std::sync::mpsc::channel::<()>();
     let (address, server) = serve(move |mut connection| {
         connection.write_all(&stream(60)).unwrap();
@@ -217,7 +217,7 @@ fn what_was_seen_before_the_connection_was_lost_is_kept() {
         assert!(silent.stderr.contains(part), "{part}: {}", silent.stderr);
     }
     assert!(!whole(&at.join("silent")).is_empty());
-    // The server goes away, in the middle of what it said would come.
+    // The server disconnects before it has sent what it announced.
     let (address, server) = serve(|mut connection| {
         for part in stream(60).chunks(200_000) {
             connection.write_all(part).unwrap();
@@ -237,7 +237,7 @@ fn what_was_seen_before_the_connection_was_lost_is_kept() {
 }
 
 #[test]
-fn what_cannot_be_opened_is_an_error() {
+fn a_source_that_cannot_be_opened_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     network(at);
@@ -304,7 +304,7 @@ fn what_cannot_be_opened_is_an_error() {
     refused(&nothing, &["standard input", "gave no frame"]);
 }
 
-/// Frames and targets of a run that is at work are not another's to replace, not even where replacing is asked for.
+/// Frames and targets of a running run cannot be replaced by another, even with --overwrite.
 #[test]
 fn a_folder_in_which_a_run_is_at_work_is_left_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -337,10 +337,10 @@ fn a_folder_in_which_a_run_is_at_work_is_left_alone() {
     }
 }
 
-/// Before ffmpeg 5.1 an option had another name.
+/// Before ffmpeg 5.1, one of its options had another name.
 #[test]
 #[cfg(unix)]
-fn an_old_ffmpeg_is_asked_in_its_own_words() {
+fn an_old_ffmpeg_is_given_its_old_option() {
     use std::os::unix::fs::PermissionsExt;
 
     let folder = tempfile::tempdir().unwrap();

@@ -9,7 +9,7 @@ use serde_json::Value;
 /// The preset `tiny` with every part of the paper's network.
 fn with_parts(config: &str) -> String {
     let whole = config.replacen("aggregation = false", "aggregation = true", 1);
-    // The depth network's encoder stands before the pose network's.
+    // The depth network's encoder comes before the pose network's.
     let start = whole.find("[depth_net.encoder]").unwrap();
     let (before, encoder) = whole.split_at(start);
     let encoder = encoder.replacen("output_stride = 32", "output_stride = 16", 1);
@@ -44,7 +44,7 @@ fn a_run_with_every_part_of_the_network() {
     );
     ok(at, "train --resume --data sim --steps 3 --out run");
 
-    // Both engines say the same.
+    // Both engines give the same result.
     let image = "sim/2026_01_01/2026_01_01_drive_0003_sync/image_02/data/0000000004.png";
     for engine in ["burn", "fused"] {
         let args = format!(
@@ -54,7 +54,7 @@ fn a_run_with_every_part_of_the_network() {
     }
     let depth = |engine: &str| -> Vec<f32> {
         let file = fs::read(at.join(engine).join("0000000004_depth.npy")).unwrap();
-        // The numbers stand behind a header.
+        // The numbers follow a header.
         let numbers = &file[file.len() - 4 * 96 * 64..];
         let number = |b: &[u8]| f32::from_le_bytes(b.try_into().unwrap());
         numbers.chunks_exact(4).map(number).collect()
@@ -63,7 +63,7 @@ fn a_run_with_every_part_of_the_network() {
         assert!((burn / fused - 1.0).abs() < 1e-3, "{burn} {fused}");
     }
 
-    // Image and depth, then a feature, what the decoder reads and a mask for each layer, in three columns.
+    // Image and depth, then for each layer a feature, the decoder's input and a mask, in three columns.
     let size = |engine: &str| {
         let picture = image::open(at.join(engine).join("0000000004_features.png")).unwrap();
         (picture.width(), picture.height())
@@ -71,7 +71,7 @@ fn a_run_with_every_part_of_the_network() {
     assert_eq!(size("burn"), size("fused"));
     let (width, height) = size("fused");
     assert!(width > 3 * 480 && height > 5 * 320, "{width}x{height}");
-    // Without the parts the features alone, in two.
+    // Without the parts only the features, in two columns.
     ok(
         at,
         &format!("predict --model plain {image} --save features --out plain_features"),

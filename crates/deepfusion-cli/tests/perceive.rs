@@ -1,4 +1,4 @@
-//! Targets through the program alone.
+//! Targets through the program.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 const DRIVE: &str = "street/2026_01_01/2026_01_01_drive_0005_sync";
 
-/// A street with traffic, as a drive and as a bag, and a network that has seen a few steps of it.
+/// A street with traffic, as a drive and as a bag, and a network trained on it for a few steps.
 fn street(folder: &Path) {
     ok(
         folder,
@@ -62,11 +62,11 @@ fn a_drive_becomes_targets_frame_by_frame() {
         .unwrap();
         assert_eq!(&own, line);
     }
-    // The first camera is the world; the last has driven on.
+    // The first camera's axes are the world's; the last camera has moved forward.
     let place = |line: &Value, k: usize| line["camera_motion"][4 * k + 3].as_f64().unwrap();
     assert_eq!(place(&lines[0], 2), 0.0);
     assert!(place(&lines[11], 2) > 3.0);
-    // Nothing is overwritten unless asked.
+    // No file is overwritten unasked.
     let again = run(at, &args);
     assert_eq!(again.code, 1);
     assert!(again.stderr.contains("already exists") && again.stderr.contains("--overwrite"));
@@ -74,7 +74,7 @@ fn a_drive_becomes_targets_frame_by_frame() {
 }
 
 #[test]
-fn images_stand_for_themselves_and_bags_bring_their_pictures() {
+fn single_images_and_bags_become_targets() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     street(at);
@@ -139,7 +139,7 @@ fn a_calibrated_run_gives_its_clouds_a_confidence() {
     let page = std::fs::read_to_string(at.join("page.html")).unwrap();
     assert!(page.contains("How far to trust a pixel"));
     assert!(cloud("after").contains("property float confidence"));
-    // A file that is none is an error, not passed over.
+    // A malformed file is an error and not ignored.
     std::fs::write(at.join("run/confidence.toml"), "single = 3").unwrap();
     let run_ = run(
         at,
@@ -150,7 +150,7 @@ fn a_calibrated_run_gives_its_clouds_a_confidence() {
 }
 
 #[test]
-fn a_calibration_tools_file_brings_camera_and_lens() {
+fn a_calibration_tools_file_gives_camera_and_lens() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     street(at);
@@ -173,7 +173,7 @@ fn a_calibration_tools_file_brings_camera_and_lens() {
     assert!(sidecar["made_with"]["calibration_sha256"].is_string());
     let fx = sidecar["intrinsics"][0].as_f64().unwrap();
     assert!((100.0..186.1).contains(&fx), "{fx}");
-    // Made with another file they are others.
+    // With another file the outputs differ.
     std::fs::write(at.join("camera.yaml"), yaml(320) + "# touched\n").unwrap();
     let args = format!("predict --model run {image} --calib camera.yaml --out depth");
     let again = run(at, &args);
@@ -182,7 +182,7 @@ fn a_calibration_tools_file_brings_camera_and_lens() {
         "{}",
         again.stderr
     );
-    // A calibration of another size is no calibration of this image.
+    // A calibration for another image size is refused.
     std::fs::write(at.join("camera.yaml"), yaml(640)).unwrap();
     let wrong = run(at, &format!("{args} --overwrite"));
     assert_eq!(wrong.code, 1);
@@ -219,10 +219,10 @@ fn exact_depth_finds_the_simulators_boxes() {
     assert!(lidar.contains("targets from lidar depth"), "{lidar}");
 }
 
-/// A report of targets says of which predictions their depth is the mean. Whether those of a few frames differ is not certain; that the option reaches
-/// the network is seen where one of a single size refuses it, in [`what_is_wrong_is_named`].
+/// A report of targets states which predictions their depth is the mean of. Targets of so few frames may not differ; that the option reaches
+/// the network is tested in [`what_is_wrong_is_named`], where a network of a single size refuses it.
 #[test]
-fn a_report_says_of_which_predictions_its_depth_is_the_mean() {
+fn a_report_states_which_predictions_its_depth_is_the_mean_of() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -241,12 +241,12 @@ fn a_report_says_of_which_predictions_its_depth_is_the_mean() {
     let text = ok(at, &format!("{eval} --post-process multi-scale")).stdout;
     let head = "targets from predicted (multi-scale) depth, 3 frames";
     assert!(text.starts_with(head), "{text}");
-    // What was measured is one depth.
+    // Measured depth is not a mean of predictions.
     let measured = "eval-targets --data street --depth truth --post-process flip";
     assert_eq!(run(at, measured).code, 2);
 }
 
-/// A model of the instances' crate's own tests.
+/// A model from the tests of the crate `deepfusion-instances`.
 fn model(name: &str) -> String {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let path = crates.join(format!("deepfusion-instances/tests/reference/{name}.onnx"));
@@ -254,7 +254,7 @@ fn model(name: &str) -> String {
 }
 
 #[test]
-fn a_users_model_names_what_stands_there() {
+fn a_users_model_gives_targets_their_class() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     street(at);
@@ -290,7 +290,7 @@ fn a_users_model_names_what_stands_there() {
     );
     assert!(
         !at.join("no_detector").exists(),
-        "nothing is begun with a model that is none"
+        "nothing is started with an invalid model"
     );
     let printed = ok(at, &with("red_things", "--instance-score 0.5"));
     for line in printed.stdout.lines() {
@@ -325,9 +325,9 @@ fn what_is_wrong_is_named() {
         assert!(run.stderr.contains(named), "{args}: {}", run.stderr);
         assert!(run.stderr.contains("hint:"), "{args}: {}", run.stderr);
     }
-    // Nothing was seen: nothing is in the way of the next attempt.
+    // No frame was processed, so nothing blocks the next attempt.
     assert!(!at.join("a/targets.jsonl").exists());
-    // What another command wrote there stays.
+    // Files that another command wrote there remain.
     let picture = format!("{DRIVE}/image_02/data/0000000003.png --intrinsics 186,186,157,44");
     ok(at, &format!("predict --model run {picture} --out theirs"));
     let depth = || std::fs::read(at.join("theirs/0000000003_depth.png")).unwrap();
@@ -338,7 +338,7 @@ fn what_is_wrong_is_named() {
     fails(
         at,
         &format!("predict --model run {picture} --out theirs/0000000003_depth.png"),
-        &["a file, and a folder", "--out"],
+        &["expected a folder for the outputs", "--out"],
     );
     std::fs::write(at.join("wrong.toml"), "min_pixel = 3\n").unwrap();
     let args = format!("perceive --model run {DRIVE} --out c --config wrong.toml");
@@ -356,7 +356,7 @@ fn what_is_wrong_is_named() {
         "{}",
         run_.stderr
     );
-    // The parser's words once, and not again as the cause of themselves.
+    // The parser's message appears once, and not again as its own cause.
     assert_eq!(run_.stderr.matches("unknown field").count(), 1);
     assert!(!run_.stderr.contains("because:"), "{}", run_.stderr);
     // A drive without labelled boxes.
@@ -380,7 +380,7 @@ fn what_is_wrong_is_named() {
         &format!("perceive --model run {images} --intrinsics 186,186,157,44 --out d"),
     );
     assert_eq!(run_.code, 1);
-    for part in ["0000000004.png", "run it anew with --overwrite"] {
+    for part in ["0000000004.png", "run it again with --overwrite"] {
         assert!(run_.stderr.contains(part), "{part}: {}", run_.stderr);
     }
     let lines = std::fs::read_to_string(at.join("d/targets.jsonl")).unwrap();

@@ -1,5 +1,5 @@
-//! The recipes for KITTI's tables start: two steps each, on a simulated drive, smaller than they say. That of the embedded networks runs to its
-//! end, at one step a stage.
+//! The recipes for KITTI's tables start: two steps each, on a simulated drive, with smaller settings. The recipe of the embedded networks runs
+//! to its end, with one step per stage.
 
 use std::path::Path;
 
@@ -18,11 +18,12 @@ fn each_row_of_kittis_tables_starts() {
     for entry in std::fs::read_dir(recipes).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
-        // Larger images change nothing here.
+        // Larger images would test nothing more.
         if name.ends_with("-1024x320") {
             continue;
         }
-        // Nothing is held out: `best` beside `last` would double what they write. ResNets are narrower: gigabytes of checkpoints say no more.
+        // Nothing is held out, since writing `best` beside `last` would double the output. ResNets are narrower: gigabytes of checkpoints
+        // would test nothing more.
         let is_resnet = name == "deepfusion" || name.starts_with("monodepth2");
         let narrower = if is_resnet {
             "--set depth_net.encoder.base_width=16 --set pose_net.encoder.base_width=8"
@@ -43,7 +44,7 @@ fn each_row_of_kittis_tables_starts() {
     assert_eq!(started, 11);
 }
 
-/// `deepfusion` for `recipes/street.sh`: few frames and views, narrow networks, one step. What it is asked for it adds to `log`. Where there is
+/// A `deepfusion` for `recipes/street.sh`: few frames and views, narrow networks, one step. It appends its arguments to `log`. If there is
 /// a file `stop`, it ends as after Ctrl-C once the second stage has made its step.
 #[cfg(unix)]
 const SMALLER: &str = r#"#!/usr/bin/env bash
@@ -82,7 +83,7 @@ if [ -e stop ] && [[ $asked == *street-more.toml* ]]; then
 fi
 "#;
 
-/// Drives where `KITTI` has those that the cards have figures of: the first with frames 0 and 20.
+/// Drives in place of those of `KITTI` on which the cards' metrics are measured: the first with frames 0 and 20.
 #[cfg(unix)]
 fn write_kitti(at: &Path) {
     ok(
@@ -102,10 +103,10 @@ fn write_kitti(at: &Path) {
     std::fs::rename(at.join("kitti/2026_01_01"), at.join("kitti/2011_09_26")).unwrap();
 }
 
-/// The chain of the embedded networks: stopped and gone on with, it makes both cards with all that they have; done, the same bytes again.
+/// The recipe of the embedded networks: stopped and continued, it writes both cards with all their entries; run again, it packs the same bytes.
 #[test]
 #[cfg(unix)]
-fn the_embedded_networks_are_made_and_packed_again_alike() {
+fn the_embedded_networks_are_made_and_packed_reproducibly() {
     use std::fs;
     use std::os::unix::fs::PermissionsExt;
     use std::process::Command;
@@ -143,7 +144,7 @@ fn the_embedded_networks_are_made_and_packed_again_alike() {
     fs::remove_file(at.join("stop")).unwrap();
     let (code, said) = run();
     assert_eq!(code, 0, "{said}");
-    // What was begun is gone on with, and what was done is not done again.
+    // The unfinished stage is continued, and finished ones are not repeated.
     assert_eq!(asked("train --out out/street-more --resume"), 1);
     assert_eq!(asked("train --config"), 7);
 
@@ -167,7 +168,7 @@ fn the_embedded_networks_are_made_and_packed_again_alike() {
             "41, 42, 43",
             "rooms",
         ];
-        // The small one does not say how sure it is: there is nothing to calibrate.
+        // The small one predicts no uncertainty, so there is nothing to calibrate.
         if name == "tiny" {
             expected.remove(2);
         }

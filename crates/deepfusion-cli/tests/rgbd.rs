@@ -1,4 +1,4 @@
-//! RGB-D folders through the program: the colour images are looked at, by the folder's own camera.
+//! RGB-D folders through the program: the colour images are used, with the folder's own camera.
 
 use std::path::Path;
 
@@ -22,7 +22,7 @@ pub(crate) fn write_folder(folder: &Path) {
     std::fs::write(camera, "90 0 47.5\n0 91 31.5\n0 0 1\n").unwrap();
 }
 
-/// A network that has seen one step.
+/// A network trained for one step.
 fn train(folder: &Path) {
     ok(
         folder,
@@ -42,7 +42,7 @@ fn depth_images_are_not_taken_for_pictures() {
     write_folder(&at.join("desk"));
     let printed = json(at, "predict --model run desk --out depth --json");
     let sidecars = printed.as_array().unwrap();
-    assert_eq!(sidecars.len(), 3, "a frame each: {printed}");
+    assert_eq!(sidecars.len(), 3, "one per frame: {printed}");
     for (n, sidecar) in sidecars.iter().enumerate() {
         let image = sidecar["image"].as_str().unwrap();
         assert!(
@@ -61,7 +61,7 @@ fn depth_images_are_not_taken_for_pictures() {
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
     assert_eq!(frames.len(), 3);
-    // Without its camera it is no recording that could be predicted in metres: said, not guessed.
+    // Without its camera, depth in metres cannot be predicted: an error, not a guess.
     std::fs::remove_file(at.join("desk/camera-intrinsics.txt")).unwrap();
     fails(
         at,
@@ -72,7 +72,7 @@ fn depth_images_are_not_taken_for_pictures() {
         at,
         "predict --model run desk --intrinsics 90,91,47.5,31.5 --out other",
     );
-    // Other folders of images are what they were, whatever their names end in.
+    // Other folders of images are unaffected, whatever their file names end in.
     std::fs::create_dir(at.join("pictures")).unwrap();
     for name in ["a.color.png", "a.depth.png"] {
         let from = at.join("desk/frame-000000.color.png");
@@ -83,7 +83,7 @@ fn depth_images_are_not_taken_for_pictures() {
         "predict --model run pictures --intrinsics 90,91,47.5,31.5 --out plain --json",
     );
     assert_eq!(printed.as_array().unwrap().len(), 2, "{printed}");
-    // By the field of view: 96 pixels that see 90 degrees.
+    // From the field of view: 96 pixels cover 90 degrees.
     let printed = json(
         at,
         "predict --model run pictures --hfov 90 --out wide --json",
@@ -96,7 +96,7 @@ fn depth_images_are_not_taken_for_pictures() {
 }
 
 #[test]
-fn a_conversion_says_what_was_not_there_to_convert() {
+fn a_conversion_reports_what_the_recording_lacks() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     write_folder(&at.join("desk"));
@@ -113,7 +113,7 @@ fn a_conversion_says_what_was_not_there_to_convert() {
         "{}",
         converted.stderr
     );
-    // A drive with both says nothing of the kind.
+    // A drive with both gives no such warning.
     ok(
         at,
         "simulate --out sim --frames 4 --scan-every 0 --size 64x48",

@@ -1,4 +1,4 @@
-//! The watch over a drive's metres, through the program alone.
+//! The scale monitor, through the program.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use image::imageops::{FilterType, crop_imm, resize};
 use serde_json::Value;
 
 const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0081_sync";
-/// Frames of the drive, and from which on its images are zoomed by 10 %.
+/// Frames of the drive, and the first whose image is zoomed by 10 %.
 const FRAMES: [usize; 2] = [250, 110];
 
 fn number(folder: &Path, frame: usize, key: &str) -> Option<f64> {
@@ -21,7 +21,7 @@ fn sidecar(folder: &Path, frame: usize) -> Value {
 }
 
 #[test]
-fn a_zoom_is_noticed_and_depth_brought_back() {
+fn a_zoom_is_detected_and_depth_corrected() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let [frames, zoomed_from] = FRAMES;
@@ -59,7 +59,7 @@ fn a_zoom_is_noticed_and_depth_brought_back() {
         printed.stderr
     );
     let (plain, corrected) = (at.join("plain"), at.join("corrected"));
-    // The first frame has none before it, the next ones are learned from.
+    // The first frame has no predecessor; the next ones define the initial scale.
     assert!(sidecar(&plain, 0)["scale_monitor"].is_null());
     assert_eq!(
         sidecar(&plain, zoomed_from - 20)["scale_monitor"]["state"],
@@ -75,20 +75,20 @@ fn a_zoom_is_noticed_and_depth_brought_back() {
     assert!((factor / ratio - 1.0).abs() < 0.03, "{factor} {ratio}");
     assert!((1.05..1.16).contains(&factor), "{factor}");
     assert_eq!(number(&corrected, zoomed_from, "correction"), Some(1.0));
-    // What is written is corrected by what was known before the frame.
+    // The written depth is corrected by the factor known before the frame.
     let depth = |folder: &Path, frame| sidecar(folder, frame)["depth_m"][0].as_f64().unwrap();
     let last = frames - 1;
     let change = depth(&corrected, last) / depth(&plain, last);
     assert!((change / factor - 1.0).abs() < 1e-4, "{change} {factor}");
     let before = zoomed_from - 1;
     assert_eq!(depth(&corrected, before), depth(&plain, before));
-    // Other options: nothing of the other run is taken for this one's.
+    // With other options, outputs of the other run are not reused.
     fails(
         at,
         &format!("predict --model run {DRIVE} --save depth-png --out corrected"),
         &["another --correct-scale"],
     );
-    // Where nothing is watched, nothing is silently left undone.
+    // Inputs that cannot be monitored are an error, not silently uncorrected.
     let images = format!("{DRIVE}/image_02/data");
     fails(
         at,
@@ -103,7 +103,7 @@ fn a_zoom_is_noticed_and_depth_brought_back() {
     fails(
         at,
         &format!("predict --model run {DRIVE} --shard 1/2 --correct-scale --out none"),
-        &["a shard sees only some"],
+        &["a shard has only some"],
     );
     assert!(!at.join("none").exists());
 }

@@ -1,4 +1,4 @@
-//! Networks without a run: packed from one, embedded in the program, or neither.
+//! Networks without a run folder: packed, embedded in the program, or missing.
 
 use std::fs;
 use std::path::Path;
@@ -6,9 +6,9 @@ use std::path::Path;
 use crate::support::{fails, json, ok, run};
 use serde_json::Value;
 
-/// A run, and what a packed file of it is to `predict`, `eval`, `export`, `bench` and `train`.
+/// A run, and its packed file in `predict`, `eval`, `export`, `bench` and `train`.
 #[test]
-fn a_packed_network_stands_for_its_run() {
+fn a_packed_network_replaces_its_run() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -27,7 +27,7 @@ fn a_packed_network_stands_for_its_run() {
         let read = |folder: &str| fs::read(at.join(folder).join(file)).unwrap();
         assert_eq!(read("packed"), read("again"), "{file}");
     }
-    // Half the size of the depth network alone, and nothing of where it was made.
+    // Half the size of the depth network alone, and no paths of where it was made.
     let bytes = fs::metadata(at.join("packed/hut.safetensors"))
         .unwrap()
         .len();
@@ -65,7 +65,7 @@ fn a_packed_network_stands_for_its_run() {
     ok(at, &format!("{pack} --out packed --overwrite"));
 
     let model = "--model packed/hut.safetensors";
-    // The metres are the run's, but for the digits that bf16 loses.
+    // Depth is the run's, except for the digits that bf16 loses.
     let again = json(at, &format!("eval {model} --data sim --crop none --json"));
     let abs_rel = |report: &Value| report["unscaled"]["abs_rel"].as_f64().unwrap();
     let (a, b) = (abs_rel(&measured), abs_rel(&again));
@@ -79,7 +79,7 @@ fn a_packed_network_stands_for_its_run() {
         "{}",
         table.stdout
     );
-    assert!(table.stderr.contains("not kept"), "{}", table.stderr);
+    assert!(table.stderr.contains("not saved"), "{}", table.stderr);
     let kept = fs::read_dir(at.join("packed")).unwrap().count();
     assert_eq!(kept, 2, "only the two files");
     fails(
@@ -104,7 +104,7 @@ fn a_packed_network_stands_for_its_run() {
         of_file["made_with"]["weights"],
         of_run["made_with"]["weights"]
     );
-    // The camera trained with came along: it is assumed by both, and corrects both alike.
+    // The training camera was packed, too: both assume it, and both are corrected by it.
     for field in [
         "intrinsics",
         "intrinsics_from",
@@ -119,10 +119,10 @@ fn a_packed_network_stands_for_its_run() {
         let (a, b) = (depth(&of_run), depth(&of_file));
         assert!((a - b).abs() < 0.05 * a, "{a} and {b}");
     }
-    // The same again finds everything there.
+    // The same command again finds everything done.
     let there = ok(at, &format!("predict {model} {image} --save npy --out b"));
     assert!(
-        there.stderr.contains("1 were there already"),
+        there.stderr.contains("1 existed already"),
         "{}",
         there.stderr
     );
@@ -135,7 +135,7 @@ fn a_packed_network_stands_for_its_run() {
     let onnx = json(at, &format!("export {model} --out hut.onnx --json"));
     assert_eq!(onnx["size"], serde_json::json!([96, 64]));
     assert!(onnx["training_fy_px"].is_f64());
-    // The embedded ones learned many cameras: every picture's depth is to be multiplied by its own focal length.
+    // The embedded networks were trained on many cameras: depth is to be multiplied by each picture's own focal length.
     let onnx = json(
         at,
         "export --model tiny --size 96x64 --out tiny.onnx --json",
@@ -151,7 +151,7 @@ fn a_packed_network_stands_for_its_run() {
         &["hut", "no pose network"],
     );
     ok(at, &format!("eval-targets {model} --data sim --json"));
-    // What is packed is packed.
+    // A packed network cannot be packed again.
     fails(
         at,
         "weights pack --model packed/hut.safetensors --name x --out y",
@@ -200,7 +200,7 @@ fn starts_runs(at: &Path) {
     let init = config("tuned")["init"].as_str().unwrap().to_owned();
     assert!(init.ends_with("packed/hut.safetensors") && Path::new(&init).is_absolute());
     assert!(!config("tuned").contains_key("init_sha256"));
-    // Repeated by its own file, it is the same run.
+    // Repeated from its own config.toml, it is the same run.
     ok(at, "train --config tuned/config.toml --out repeated");
     let last = |run: &str| {
         let read = deepfusion_nn::weights::read_safetensors_under;
@@ -216,7 +216,7 @@ fn starts_runs(at: &Path) {
         "train --out tuned --resume --steps 3 --init none",
         &["--init", "none", "hut.safetensors"],
     );
-    // Another network cannot start from it, and the first tensor that differs is named.
+    // A different network cannot start from it, and the first tensor that differs is named.
     fails(
         at,
         &format!("{train} --preset light --init packed/hut.safetensors --out wide"),
@@ -229,7 +229,7 @@ fn starts_runs(at: &Path) {
 
 /// A name that is neither a path nor embedded, and no name at all.
 #[test]
-fn what_is_not_there_is_an_error_that_names_what_is() {
+fn a_missing_network_is_an_error_that_names_the_existing_ones() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -253,7 +253,7 @@ fn what_is_not_there_is_an_error_that_names_what_is() {
         fails(at, command, &["no-such-network", "folder", embedded]);
         assert!(!at.join("out").exists(), "{command}");
     }
-    // What is left of a run is an error, whatever else could be meant.
+    // An incomplete run is an error, even if its name is also an embedded network's.
     fs::create_dir(at.join("street")).unwrap();
     fs::write(at.join("street/last.safetensors"), "").unwrap();
     fails(
@@ -261,7 +261,7 @@ fn what_is_not_there_is_an_error_that_names_what_is() {
         "predict --model street sim --out out",
         &["street", "config.toml is missing"],
     );
-    // A folder of something else does not hide the network of its name.
+    // A folder that is no run does not hide the network of its name.
     fs::rename(
         at.join("street/last.safetensors"),
         at.join("street/photo.png"),
@@ -298,7 +298,7 @@ fn what_is_not_there_is_an_error_that_names_what_is() {
     assert_eq!(bench["network"], "tiny");
 }
 
-/// What this build embeds, if anything: listed, used without a word, and what new runs of the same layers start from.
+/// The networks that this build embeds, if any: listed, used by default, and the start of new runs with the same layers.
 #[test]
 fn what_is_embedded_is_listed_and_used() {
     let folder = tempfile::tempdir().unwrap();
@@ -354,7 +354,8 @@ fn what_is_embedded_is_listed_and_used() {
     if names.contains(&deepfusion_weights::DEFAULT) {
         let run = ok(at, "predict sim --out unasked");
         assert!(
-            run.stderr.contains("no --model: the embedded network"),
+            run.stderr
+                .contains("no --model given: using the embedded network"),
             "{}",
             run.stderr
         );

@@ -1,4 +1,4 @@
-//! Splits: how much of one was used, and that nothing is both learned from and validated on.
+//! Splits: how much of one was used, and that no frame is both trained on and validated on.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use crate::support::{fails, json, ok, run};
 const DRIVE: &str = "2026_01_01/2026_01_01_drive_0003_sync";
 const SMALL: &str = "--size 96x64 --batch 2 --steps 1 --init none";
 
-/// A split of these frames of the drive, and of as many of a drive that is not there.
+/// A split of these frames of the drive, and of as many frames of a drive that does not exist.
 fn write_split(at: &Path, name: &str, numbers: impl Iterator<Item = u32>, elsewhere: u32) {
     let here = numbers.map(|n| format!("{DRIVE} {n} l\n"));
     let there = (0..elsewhere).map(|n| format!("2026_01_01/2026_01_01_drive_0009_sync {n} l\n"));
@@ -17,7 +17,7 @@ fn write_split(at: &Path, name: &str, numbers: impl Iterator<Item = u32>, elsewh
 }
 
 #[test]
-fn a_split_of_which_a_part_is_there_is_said_to_be_one() {
+fn a_split_of_which_only_a_part_exists_gives_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -60,7 +60,7 @@ fn a_split_of_which_a_part_is_there_is_said_to_be_one() {
     let whole = run(at, &format!("{eval} --split whole.txt --strict"));
     assert_eq!(whole.code, 0, "{}", whole.stderr);
     assert!(!whole.stderr.contains("whole.txt"), "{}", whole.stderr);
-    // Without a split nothing is expected.
+    // Without a split no frames are expected.
     let report = json(at, &format!("{eval} --json"));
     assert!(report["expected"].is_null());
 
@@ -82,7 +82,7 @@ fn a_split_of_which_a_part_is_there_is_said_to_be_one() {
             &format!("{export} --split {split} --strict --out b.npz"),
             &[split],
         );
-        assert!(!at.join("b.npz").exists(), "nothing is left of a part");
+        assert!(!at.join("b.npz").exists(), "no incomplete file is left");
     }
     ok(
         at,
@@ -91,7 +91,7 @@ fn a_split_of_which_a_part_is_there_is_said_to_be_one() {
 }
 
 #[test]
-fn validation_frames_that_are_learned_from_are_refused() {
+fn validation_frames_that_are_trained_on_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -108,7 +108,7 @@ fn validation_frames_that_are_learned_from_are_refused() {
     write_split(at, "train.txt", 0..7, 0);
     write_split(at, "val.txt", 8..12, 0);
     write_split(at, "across.txt", 4..12, 0);
-    // The split is one of training frames; of the same root everything else would be validated on, and these with it.
+    // The split selects training frames only; the whole of the same root, including them, would be validated on.
     fails(
         at,
         &train("--split train.txt --val-data sim --out a"),
@@ -120,7 +120,7 @@ fn validation_frames_that_are_learned_from_are_refused() {
         &["3 of 2026_01_01_drive_0003_sync"],
     );
     assert!(!at.join("a").exists());
-    // With or without --val-data: frames of their own.
+    // Separate frames, with or without --val-data.
     let own = ok(at, &train("--split train.txt --val-split val.txt --out b"));
     assert!(!own.stderr.contains("validation frames"), "{}", own.stderr);
     let config = fs::read_to_string(at.join("b/config.toml")).unwrap();
@@ -130,7 +130,7 @@ fn validation_frames_that_are_learned_from_are_refused() {
         at,
         &train("--split train.txt --val-data sim --val-split val.txt --out c"),
     );
-    // Frames that training saw as neighbours are said.
+    // Frames that training saw as neighbours give a warning.
     write_split(at, "next.txt", 7..12, 0);
     let next = ok(at, &train("--split train.txt --val-split next.txt --out d"));
     assert!(

@@ -1,4 +1,4 @@
-//! Ctrl-C in `simulate` and `data convert`: nothing is left of what is not done, and nothing in the way of the next one.
+//! Ctrl-C in `simulate` and `data convert`: no incomplete output is left, and nothing blocks the next attempt.
 
 #![cfg(unix)]
 
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use crate::support::ok;
 
-/// Starts the program, sends SIGINT once it writes into `out`, and looks at how it ends.
+/// Starts the program, sends SIGINT once it writes into `out`, and checks how it ends.
 fn stop(folder: &Path, args: &str, out: &Path) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
         .current_dir(folder)
@@ -18,7 +18,7 @@ fn stop(folder: &Path, args: &str, out: &Path) {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // What is written aside is there after the handler.
+    // The temporary output appears after the handler is set.
     while !is_writing(out) && child.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -38,7 +38,7 @@ fn stop(folder: &Path, args: &str, out: &Path) {
     }
 }
 
-/// Whether something is in a folder whose name only what is written aside has.
+/// Whether a temporary folder for the output contains something.
 fn is_writing(out: &Path) -> bool {
     fs::read_dir(out)
         .into_iter()

@@ -1,4 +1,4 @@
-//! The texts people meet: help and errors, as they come out of the program.
+//! The texts that users see: help and errors, as the program prints them.
 
 use std::path::Path;
 
@@ -46,9 +46,9 @@ fn help_texts() {
     }
 }
 
-/// What `config show` prints is a run's `config.toml`, and is read as one.
+/// The output of `config show` is a run's `config.toml`, and can be read as one.
 #[test]
-fn a_run_shows_what_it_learned_with() {
+fn a_run_shows_its_configuration() {
     let folder = tempfile::tempdir().unwrap();
     let show = |args: &[&str]| in_folder(folder.path(), &[&["config", "show"], args].concat());
     let of_preset = show(&["light", "--set", "batch=7"]);
@@ -181,7 +181,7 @@ fn wrong_arguments_end_with_2_and_suggest_the_near_one() {
     }
 }
 
-/// Every command is in what a shell completes, and has a page of the manual.
+/// Shells complete every command, and the manual has a page for each.
 #[test]
 fn shells_and_the_manual_know_every_command() {
     let commands = ["train", "predict", "perceive", "eval-targets", "weights"];

@@ -1,4 +1,4 @@
-//! Training, evaluation and prediction through the program alone, on good input and bad.
+//! Training, evaluation and prediction through the program, on good and bad input.
 
 use std::fs;
 
@@ -11,7 +11,7 @@ use serde_json::Value;
 const SMALL: &str = "--size 96x64 --batch 2 --init none";
 
 #[test]
-fn a_drive_is_learned_resumed_evaluated_and_predicted() {
+fn a_drive_is_trained_on_resumed_evaluated_and_predicted() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(at, "simulate --out sim --frames 12 --seed 3 --scan-every 4");
@@ -26,7 +26,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     }
     assert_eq!(fs::read_dir(at.join("run/panels")).unwrap().count(), 1);
 
-    // A longer run goes on; one that is there is not overwritten.
+    // A run can be continued with more steps; an existing one is not overwritten.
     ok(at, "train --out run --resume --steps 3");
     let log = fs::read_to_string(at.join("run/log.csv")).unwrap();
     let steps: Vec<_> = log
@@ -35,7 +35,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
         .map(|l| &l[..1])
         .collect();
     assert_eq!(steps, ["1", "2", "3"]);
-    // It cannot become shorter than it is, and stays as it was set.
+    // It cannot become shorter than it is, and keeps its settings.
     fails(
         at,
         "train --out run --resume --steps 2",
@@ -49,8 +49,8 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
         &["run"],
     );
 
-    // A new run may start from another's networks; its PoseNet goes on to speak of that one's unit. What that one does
-    // not have is printed.
+    // A new run may start from another's networks; its PoseNet keeps that one's unit. Parts that that one does
+    // not have are printed.
     let tuned = ok(
         at,
         "train --data sim --size 96x64 --batch 2 --steps 1 --with flow --init run --out tuned",
@@ -59,7 +59,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     assert!(tuned.stderr.contains(line), "{}", tuned.stderr);
     let unit = |run: &str| {
         let config = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
-        // What was found stands behind what was set.
+        // Measured values follow the settings.
         let line = config.lines().rfind(|l| l.starts_with("metres_per_unit"));
         line.unwrap().to_owned()
     };
@@ -73,7 +73,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     assert!(abs_rel > 0.01 && abs_rel < 3.0, "{abs_rel}");
     assert!(report["scale"]["median"].as_f64().unwrap() > 0.2);
     assert!(report["trivial"]["unscaled"]["abs_rel"].is_number());
-    // Which of the run's checkpoints that was: what was validated last, the third step or before.
+    // The run's checkpoint that was evaluated: the last that was validated, at the third step or before.
     assert_eq!(report["checkpoint"]["name"], "best");
     assert_eq!(report["checkpoint"]["path"], "run/best.safetensors");
     let step = report["checkpoint"]["step"].as_u64().unwrap();
@@ -97,7 +97,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     let sidecar: Value = serde_json::from_str(&sidecar).unwrap();
     assert_eq!(sidecar["files"].as_array().unwrap().len(), 5);
     assert_eq!(sidecar["camera_known"], true);
-    // Measured on what was learned from, alone: that says nothing of the metres.
+    // Evaluated on training data only, which proves nothing about the scale.
     let unknown = serde_json::json!({"bias": null, "ci95": null, "verdict": "open"});
     assert_eq!(sidecar["scale"], unknown);
     ok(
@@ -121,7 +121,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
             "{said} {found}"
         );
     }
-    // Two steps are no reason to trust it, wherever its metres happen to lie.
+    // After two steps the scale cannot be trusted, whatever it happens to be.
     assert_ne!(measured["scale"]["verdict"], "trusted");
     let seen: Vec<_> = fs::read_dir(at.join("run/eval"))
         .unwrap()
@@ -129,14 +129,14 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
         .map(|text| serde_json::from_slice::<Value>(&text).unwrap())
         .map(|saved| saved["measured"]["held_out"].clone())
         .collect();
-    // Of best on both drives, and of last.
+    // Evaluations of best on both drives, and of last.
     assert_eq!(seen.len(), 3);
     assert!(
         seen.contains(&Value::Bool(true)) && seen.contains(&Value::Bool(false)),
         "{seen:?}"
     );
     assert!((sidecar["focal_factor"].as_f64().unwrap() - 1.0).abs() < 1e-9);
-    // Twice the focal length: the same picture is twice as far.
+    // With twice the focal length, the same picture is twice as far away.
     let k = "--intrinsics 743.6,738.9,313.9,88.3";
     ok(
         at,
@@ -145,7 +145,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     let zoomed = fs::read_to_string(at.join("zoomed/0000000001.json")).unwrap();
     let zoomed: Value = serde_json::from_str(&zoomed).unwrap();
     assert!((zoomed["focal_factor"].as_f64().unwrap() - 2.0).abs() < 1e-3);
-    // Without a camera the assumption is said.
+    // Without a camera, the assumption is printed.
     let assumed = ok(
         at,
         &format!("predict --model run {image} --out assumed --json"),
@@ -157,7 +157,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
         assumed.stdout
     );
 
-    // Nothing is overwritten, and wrong cameras are errors.
+    // No file is overwritten, and wrong cameras are errors.
     fails(
         at,
         &format!("predict --model run {image} --out assumed --save npy"),
@@ -209,9 +209,9 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     );
 }
 
-/// Recordings may take long to look at: there are none here, and what comes first is said first.
+/// Opening recordings may take long, so errors that do not need them come first: here there are no recordings.
 #[test]
-fn what_is_wrong_with_start_or_folder_is_said_before_the_recordings_are_read() {
+fn errors_of_start_or_folder_come_before_the_recordings_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::create_dir(at.join("taken")).unwrap();
@@ -228,7 +228,7 @@ fn what_is_wrong_with_start_or_folder_is_said_before_the_recordings_are_read() {
     assert!(!at.join("runs").exists());
 }
 
-/// As a scheduler and a closed terminal stop it: saved, never done, and gone on with.
+/// Stopped as by a scheduler and by a closed terminal: saved, not reported as done, and continued.
 #[test]
 #[cfg(unix)]
 fn a_stopped_run_is_saved_and_does_not_end_with_0() {
@@ -251,7 +251,7 @@ fn a_stopped_run_is_saved_and_does_not_end_with_0() {
             .spawn()
             .unwrap();
         if !reader_stays {
-            // The terminal is gone: nothing can be said any more.
+            // The terminal is closed, so nothing more is printed.
             drop(child.stderr.take());
         }
         while steps() <= before && child.try_wait().unwrap().is_none() {
@@ -269,7 +269,7 @@ fn a_stopped_run_is_saved_and_does_not_end_with_0() {
     let train = format!("train --data sim {SMALL} --steps 100000 --out run");
     let said = stopped(&train, "-TERM", true);
     assert!(
-        said.contains("hint: go on with: deepfusion train --out run --resume"),
+        said.contains("hint: continue with: deepfusion train --out run --resume"),
         "{said}"
     );
     assert!(at.join("run/last.safetensors").is_file());
@@ -284,16 +284,16 @@ fn a_stopped_run_is_saved_and_does_not_end_with_0() {
     assert_eq!(steps(), done + 1);
 }
 
-/// Whether these tests run under `nohup` or the like, which every program that they start inherits.
+/// Whether these tests run under `nohup` or similar, whose ignored signals every program that they start inherits.
 #[cfg(unix)]
 fn hangups_are_ignored() -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    // Of the mask of signals, the lowest bit is SIGHUP's.
+    // The lowest bit of the signal mask is SIGHUP's.
     ignored.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).is_ok_and(|mask| mask & 1 == 1))
 }
 
-/// `nohup` is asked to go on when the terminal closes.
+/// `nohup` must keep working after the terminal closes.
 #[test]
 #[cfg(unix)]
 fn a_hangup_that_was_ignored_stays_ignored() {
@@ -328,7 +328,7 @@ fn a_hangup_that_was_ignored_stays_ignored() {
 }
 
 #[test]
-fn a_run_is_gone_on_with_from_any_folder_and_where_its_data_is_now() {
+fn a_run_is_continued_from_any_folder_and_with_moved_data() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let elsewhere = at.join("elsewhere");
@@ -360,7 +360,7 @@ fn a_run_is_gone_on_with_from_any_folder_and_where_its_data_is_now() {
     );
     ok(at, "train --out run --resume --steps 4 --val-data val2");
     ok(&elsewhere, "train --out ../run --resume --steps 5");
-    // What is not the run's is no way to go on with it.
+    // Options that contradict the run are refused.
     fails(
         at,
         "train --out run --resume --steps 6 --batch 4",
@@ -368,7 +368,7 @@ fn a_run_is_gone_on_with_from_any_folder_and_where_its_data_is_now() {
     );
 }
 
-/// A file's recordings, and each option in the place of its own part of them.
+/// The recordings of a configuration file, and each option that replaces a part of them.
 #[test]
 fn options_replace_their_own_part_of_a_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -385,20 +385,20 @@ fn options_replace_their_own_part_of_a_file() {
         text.parse::<toml::Table>().unwrap()["data"].clone()
     };
     let path = |name: &str| toml::Value::from(at.join(name).display().to_string());
-    // Without --data: the file's recordings, validated on what is asked for.
+    // Without --data: the file's recordings, validated on those of the option.
     let second = ok(
         at,
         "train --config first/config.toml --val-data val --out second",
     );
-    // A file that names no start means none, and that is said where a network would fit.
+    // A file without `init` starts from random weights, which is printed if an embedded network would fit.
     let fits = deepfusion_weights::names().any(|name| name == "tiny");
     let said = second
         .stderr
-        .contains("starts from nothing, as the configuration names no init (--init tiny");
+        .contains("starting from random weights, as the configuration has no `init` (--init tiny");
     assert_eq!(said, fits, "{}", second.stderr);
     assert_eq!(data("second")["paths"][0], path("sim"));
     assert_eq!(data("second")["validation"][0], path("val"));
-    // With it: other recordings, and the file's validation.
+    // With --data: other recordings, and the file's validation.
     let third = ok(
         at,
         "train --config second/config.toml --data more --init none --out third",
@@ -451,7 +451,7 @@ fn what_cannot_be_trained_on_is_an_error() {
     fails(at, "train --data nowhere", &["nowhere"]);
     fs::create_dir(at.join("empty")).unwrap();
     fails(at, "train --data empty", &["empty"]);
-    // What the command line itself contradicts is not silently put right.
+    // Contradictory options are not silently resolved.
     let contradiction = run(
         at,
         "train --data empty --without speed --view-motion vehicle",
@@ -477,8 +477,8 @@ fn what_cannot_be_trained_on_is_an_error() {
     fails(at, "train --data sim", &["timestamps.txt"]);
     fs::rename(at.join("stamps"), &stamps).unwrap();
 
-    // A learning rate that destroys the weights: the loss is named with its frames, and the run can be
-    // looked at.
+    // A learning rate that destroys the weights: the error names the loss with its frames, and the run can be
+    // inspected.
     ok(
         at,
         &format!("train --data sim {SMALL} --steps 1 --out seed"),
@@ -503,7 +503,7 @@ fn what_cannot_be_trained_on_is_an_error() {
         &["loss term", "2026_01_01_drive_0003_sync/"],
     );
 
-    // A car that stands has no parallax to learn from.
+    // A car that stands still gives no parallax to learn from.
     for entry in fs::read_dir(drive.join("oxts/data")).unwrap() {
         let path = entry.unwrap().path();
         let text = fs::read_to_string(&path).unwrap();
@@ -516,10 +516,10 @@ fn what_cannot_be_trained_on_is_an_error() {
     fails(at, "train --data sim", &["m/s"]);
 }
 
-/// Two processes would write into each other's log and checkpoints.
+/// Two processes would overwrite each other's log and checkpoints.
 #[cfg(unix)]
 #[test]
-fn a_run_is_gone_on_with_by_one_process_at_a_time() {
+fn a_run_is_continued_by_one_process_at_a_time() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
@@ -536,8 +536,8 @@ fn a_run_is_gone_on_with_by_one_process_at_a_time() {
     ok(at, resume);
 }
 
-/// Imported encoders start a network whose other parts the import does not have. PoseNet's unit is the new data's: the
-/// import has never seen a metre.
+/// Imported encoders start a network whose other parts the import does not have. PoseNet's unit comes from the new data: the
+/// import has no metric scale.
 #[test]
 fn imported_encoders_start_a_preset_with_other_parts() {
     let folder = tempfile::tempdir().unwrap();
@@ -558,9 +558,9 @@ fn imported_encoders_start_a_preset_with_other_parts() {
     assert!(!config.contains("metres_per_unit = 1.0"), "{config}");
 }
 
-/// Monodepth2's preset has the shapes of the embedded network, and means other images and other depths by them.
+/// Monodepth2's preset has tensors of the embedded network's shapes, but another normalisation of images and another depth range.
 #[test]
-fn weights_that_were_learned_otherwise_are_warned_of() {
+fn weights_trained_with_other_conventions_give_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
@@ -606,7 +606,7 @@ fn weights_and_bench_say_what_they_do() {
     assert!(bench["peak_rss_mb"].as_f64().unwrap() > 1.0);
 }
 
-/// Two cameras learn from each other's view without a word of the speeds; one camera is refused.
+/// Two cameras are trained with each other's views, without speeds; one camera is refused.
 #[test]
 fn both_cameras_are_each_others_view() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! A network that says how sure it is: learned, calibrated, packed, written.
+//! A network that predicts its uncertainty: trained, calibrated, packed, written.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::support::{self, fails, json, ok};
 use serde_json::Value;
 
-/// A run that knows depth alone, and one that goes on from it with the head for uncertainty.
+/// A run that predicts only depth, and one that starts from it and adds the uncertainty head.
 fn train(at: &Path) {
     for (drive, seed) in [("sim", 3), ("other", 4)] {
         ok(
@@ -41,8 +41,8 @@ fn train(at: &Path) {
     assert!(first.parse::<f64>().unwrap() != 0.0, "{log}");
 }
 
-/// Each point has its pixel's sigma; points that are too unsure are left out where that is asked for, and `perceive` tells it of
-/// its targets and keeps it for the viewer.
+/// Each point has its pixel's sigma; points with a large sigma are left out if asked for, and `perceive` adds sigma to its targets and
+/// keeps it for the viewer.
 fn clouds_carry_it(at: &Path) {
     let cloud = |options: &str, out: &str| {
         ok(
@@ -59,7 +59,7 @@ fn clouds_carry_it(at: &Path) {
     let pixels = 160 * 96;
     let map = |ending: &str| values(&at.join(format!("all/0000000000_{ending}.npy")), pixels);
     let (depth, sigma) = (map("depth"), map("sigma"));
-    // exp(−the error that is to be expected), by the sigma that is written beside it; 0 where the network did not look.
+    // exp(−expected error), from the sigma that is written beside it; 0 outside of what the network saw.
     for (found, (z, s)) in map("confidence").iter().zip(depth.iter().zip(&sigma)) {
         if *z > 0.0 {
             let expected = (-s / (std::f32::consts::SQRT_2 * z)).exp();
@@ -73,7 +73,7 @@ fn clouds_carry_it(at: &Path) {
     let of_points = of_points.filter(|(z, _)| **z > 0.0 && **z <= 80.0);
     let expected: Vec<f32> = of_points.clone().map(|(_, s)| *s).collect();
     assert_eq!(all.sigma.unwrap(), expected);
-    // The middle of what there is, so that both sides have points.
+    // The median, so that there are points on both sides.
     let mut shares: Vec<f32> = of_points.map(|(z, s)| s / z).collect();
     shares.sort_by(f32::total_cmp);
     let most = shares[shares.len() / 2] * 1.0001;
@@ -98,7 +98,7 @@ fn values(path: &Path, count: usize) -> Vec<f32> {
 }
 
 #[test]
-fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
+fn uncertainty_is_evaluated_calibrated_and_written() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     train(at);
@@ -152,7 +152,7 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
     let held = json(at, &format!("{eval} --json"));
     assert!(held["intervals"].get("in_sample").is_none(), "{held}");
     assert_eq!(held["intervals"]["calibrated"], true);
-    // Measured where they were found, they hold what they promise, to the pixels that share a score.
+    // On the data of their calibration, the intervals have their nominal coverage, except for pixels with equal scores.
     for [level, coverage, width] in levels(&held) {
         assert!((coverage - level).abs() < 0.02, "{level}: {coverage}");
         assert!(width > 0.0);
@@ -163,7 +163,7 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
         "{table}"
     );
 
-    // Sigma is stretched as the 80 % interval was, and what was written before is made anew.
+    // Sigma is scaled like the 80 % interval, and earlier outputs are written again.
     let after = &json(
         at,
         "predict --model sure other --save sigma,npy --out word --overwrite --json",
@@ -200,17 +200,17 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
         "eval --model packed/hut.safetensors --data other --crop none --json",
     );
     assert_eq!(packed["intervals"]["calibrated"], true);
-    // A preset's network starts from it, and leaves the head aside.
+    // A preset's network starts from it, without the head.
     ok(
         at,
         "train --data sim --size 96x64 --batch 2 --steps 1 --init packed/hut.safetensors --out on",
     );
-    // Depth is all that an exported file has.
+    // An exported file contains only depth.
     ok(at, "export --model sure --out sure.onnx");
 
     let kept = at.join("sure/uncertainty.toml");
     let good = fs::read_to_string(&kept).unwrap();
-    // Of another step of the network: not used, and said.
+    // Factors of another step of the network are not used, and a warning says so.
     fs::write(&kept, good.replacen("step = ", "step = 9", 1)).unwrap();
     let stale = ok(at, "predict --model sure sim --save sigma --out stale");
     assert!(

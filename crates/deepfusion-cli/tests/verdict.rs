@@ -1,4 +1,4 @@
-//! What `eval` says of depth without ground truth, held against the simulator's truth.
+//! The verdict of `eval` without ground truth, compared with the simulator's truth.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::support::{self, json, ok};
 use serde_json::Value;
 
-/// A drive of some 70 metres along a street that no network saw.
+/// A drive of some 70 metres along a street that no network has seen.
 const DRIVE: &str = "simulate --frames 80 --seed 90100 --moving-cars 2";
 
 fn number(value: &Value) -> f64 {
@@ -15,7 +15,7 @@ fn number(value: &Value) -> f64 {
         .unwrap_or_else(|| panic!("not a number: {value}"))
 }
 
-/// The files below a folder whose names end so.
+/// The files below a folder whose names end with `end`.
 fn files(folder: &Path, end: &str) -> Vec<std::path::PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -30,7 +30,7 @@ fn files(folder: &Path, end: &str) -> Vec<std::path::PathBuf> {
 }
 
 #[test]
-fn the_certificate_holds_the_true_scale() {
+fn the_certificate_contains_the_true_scale() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(at, &format!("{DRIVE} --scan-every 10 --out street"));
@@ -47,7 +47,7 @@ fn the_certificate_holds_the_true_scale() {
     assert!(low < true_scale && true_scale < high, "{certificate}");
     assert!((scale / true_scale).ln().abs() < 0.07, "{certificate}");
     assert!(number(&certificate["blocks"]) >= 5.0);
-    // The speed's own error makes it wider, by what was said of it.
+    // The given error of the speed widens the interval accordingly.
     let bias = |name: &str| [0, 1].map(|i| number(&certificate[name][i]));
     let wide = |[low, high]: [f64; 2]| high - low;
     assert!(wide(bias("ci95")) > wide(bias("ci95_given_speed")) + 0.02);
@@ -59,7 +59,7 @@ fn the_certificate_holds_the_true_scale() {
     let page = fs::read_to_string(at.join("page.html")).unwrap();
     assert!(page.contains("Without ground truth") && page.contains("95 % interval"));
 
-    // A vehicle that says it drives 20 % faster than it does: everything seems to be that much farther away.
+    // A recorded speed 20 % too high: everything seems to be that much farther away.
     for path in files(&at.join("street"), ".txt") {
         if path.parent().unwrap().ends_with("oxts/data") {
             let text = fs::read_to_string(&path).unwrap();
@@ -100,14 +100,14 @@ fn a_drive_without_ground_truth_has_a_verdict() {
             .map(|row| (number(&row["from_mps"]), number(&row["ratio"])))
             .collect()
     };
-    // A drive at one speed has nothing to compare the road's motion with.
+    // At constant speed, there is nothing to compare the road's motion with.
     assert!(road(&found).is_empty(), "{found}");
     // An embedded network comes without a PoseNet.
     assert_eq!(
         found["without_truth"]["pose_speeds"],
         Value::Array(Vec::new())
     );
-    // A signal that is twice too fast in the second half, at speeds of their own.
+    // A signal twice too fast in the second half, where the speeds differ from the first.
     for path in files(&at.join("drive"), ".txt") {
         let frame = path.file_stem().unwrap().to_string_lossy().parse::<usize>();
         if path.parent().unwrap().ends_with("oxts/data") && frame.is_ok_and(|frame| frame >= 40) {
@@ -128,7 +128,7 @@ fn a_drive_without_ground_truth_has_a_verdict() {
     let at_speed = |from: f64| uneven.iter().find(|(mps, _)| *mps == from).unwrap().1;
     let ratio = at_speed(8.0) / at_speed(15.0);
     assert!((1.7..2.3).contains(&ratio), "{uneven:?}");
-    // A few metres of road say something, but not how sure it is.
+    // A few metres of road give a value, but no interval.
     ok(
         at,
         "simulate --frames 20 --seed 90102 --scan-every 0 --out short",
@@ -143,20 +143,20 @@ fn a_drive_without_ground_truth_has_a_verdict() {
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    // Whether a simulated drive is among what a packed network learned from is not known.
+    // Whether a packed network was trained on a simulated drive is not known.
     let unknown = json(at, "eval --model tiny --data short --json");
     assert_eq!(unknown["scale_certificate"], Value::Null);
     assert_eq!(unknown["no_certificate"], "seen_not_known");
     assert_eq!(unknown["without_truth"]["held_out"], Value::Null);
     assert!(unknown.get("unscaled").is_none());
     assert_eq!(unknown.get("certificate"), Some(&Value::Null));
-    // Nothing is left to say then.
+    // Then there is no result at all.
     let none = support::run(at, "eval --model tiny --data short --no-verdict");
     assert_eq!(none.code, 1, "{}", none.stdout);
 }
 
 #[test]
-fn frames_that_training_saw_do_not_vouch_for_it() {
+fn frames_seen_in_training_give_no_certificate() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -170,7 +170,7 @@ fn frames_that_training_saw_do_not_vouch_for_it() {
     );
     let found = json(at, "eval --model run --data drive --json");
     let looked = number(&found["without_truth"]["frames"]);
-    // After two steps PoseNet's metres are anything, but they are there.
+    // After two steps PoseNet's speeds are arbitrary, but they are reported.
     let pose = found["without_truth"]["pose_speeds"].as_array().unwrap();
     assert!(
         !pose.is_empty() && number(&pose[0]["ratio"]) > 0.0,

@@ -9,7 +9,7 @@ use crate::support::in_folder;
 use deepfusion_geometry::DepthMap;
 
 #[test]
-fn it_prints_its_address_answers_and_ends() {
+fn the_server_prints_its_address_answers_and_ends() {
     let folder = tempfile::tempdir().unwrap();
     let map = DepthMap {
         width: 4,
@@ -46,7 +46,7 @@ fn it_prints_its_address_answers_and_ends() {
         second.stderr,
         format!(
             "error: 127.0.0.1:{port}: the port is in use\n\
-             hint: give another --port, or --port 0 for any that is free\n"
+             hint: give another --port, or --port 0 for any free one\n"
         )
     );
 
@@ -66,7 +66,7 @@ fn it_prints_its_address_answers_and_ends() {
 
 #[cfg(not(feature = "rerun"))]
 #[test]
-fn without_the_feature_it_says_how_to_get_rerun_files() {
+fn a_build_without_rerun_says_how_to_get_it() {
     let folder = tempfile::tempdir().unwrap();
     let run = in_folder(folder.path(), &["view", ".", "--rerun", "a.rrd"]);
     assert_eq!((run.code, run.stdout.as_str()), (1, ""));
@@ -116,5 +116,5 @@ fn a_rerun_file_is_written_once_and_bad_frames_are_named() {
     assert_eq!(std::fs::read(folder.path().join("a.rrd")).unwrap(), bytes);
     assert_eq!(write(&["--overwrite"]).code, 0);
     let names = std::fs::read_dir(folder.path()).unwrap();
-    assert_eq!(names.count(), 3, "nothing half-written");
+    assert_eq!(names.count(), 3, "no half-written file");
 }

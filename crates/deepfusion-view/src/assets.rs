@@ -1,6 +1,6 @@
 //! The page's files, inside the binary.
 
-/// Name, type and content of each.
+/// Name, media type and content of each file.
 const FILES: &[(&str, &str, &[u8])] = &[
     ("style.css", CSS, include_bytes!("../assets/style.css")),
     (
@@ -61,7 +61,7 @@ const JS: &str = "text/javascript; charset=utf-8";
 /// The page itself.
 pub(crate) const PAGE: &str = include_str!("../assets/index.html");
 
-/// A file by its name: its type and content.
+/// Media type and content of a file.
 pub(crate) fn find(name: &str) -> Option<(&'static str, &'static [u8])> {
     let (_, content_type, content) = FILES.iter().find(|(n, ..)| *n == name)?;
     Some((content_type, content))

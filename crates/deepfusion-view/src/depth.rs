@@ -1,4 +1,4 @@
-//! A frame's depth as sent to the page: the file's own numbers, unconverted.
+//! A frame's depth as sent to the page: the numbers of its file, unconverted.
 
 use std::io::Read;
 use std::path::Path;
@@ -8,7 +8,7 @@ use deepfusion_images::{image_size, read_depth_png};
 
 use crate::{ArrayProblem, ContentProblem, Error, Result};
 
-/// More pixels than any camera's image; a file that says more is refused before anything is set aside for it.
+/// More pixels than any camera's image has. A larger file is refused before memory is allocated for it.
 const MOST_PIXELS: u64 = 64 << 20;
 
 /// The number format of a [`DepthFile`].
@@ -51,7 +51,7 @@ impl DepthFile {
             return Err(too_large(path, u64::from(width), u64::from(height)));
         }
         let map = read_depth_png(path)?;
-        // v/256 is exact in f32 for every 16-bit v, so that v comes back.
+        // v/256 is exact in f32 for every 16-bit v, so v is recovered exactly.
         let steps = map.data.iter().map(|m| (m * 256.0) as u16);
         Ok(Self {
             width,
@@ -78,12 +78,12 @@ fn too_large(path: &Path, width: u64, height: u64) -> Error {
     Error::content(path, ContentProblem::TooLarge { width, height })
 }
 
-/// An array of NumPy's format 1 to 3 (numpy.lib.format), as far as depth needs it.
+/// An array in NumPy's format 1 to 3 (numpy.lib.format), of the types that depth has.
 fn read_npy(path: &Path) -> Result<DepthFile> {
     let failed = |e| Error::file(path, e);
     let mut file = std::fs::File::open(path).map_err(failed)?;
     let length = file.metadata().map_err(failed)?.len();
-    // A header of more is none that NumPy writes for a plain array.
+    // NumPy writes no longer header for a plain array.
     let mut begin = Vec::new();
     file.by_ref()
         .take(4096)
@@ -106,7 +106,7 @@ fn read_npy(path: &Path) -> Result<DepthFile> {
     }
     let read = begin.len() as u64;
     let mut values = begin.split_off(header.begin.min(begin.len()));
-    // Of a small array the numbers, and what may stand behind them, are read already.
+    // The numbers of a small array, and any bytes after them, have been read already.
     file.take(expected.saturating_sub(read))
         .read_to_end(&mut values)
         .map_err(failed)?;
@@ -127,7 +127,7 @@ fn read_npy(path: &Path) -> Result<DepthFile> {
     })
 }
 
-/// Height, width and bytes of a number of the arrays that are depth.
+/// Height, width and bytes per number of a depth array.
 fn layout(header: &NpyHeader) -> Result<[u64; 3], ArrayProblem> {
     let item_bytes = match header.descr.as_deref() {
         Some("<f4") => 4,
@@ -151,7 +151,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
-        /// Every step of a depth PNG arrives.
+        /// Every value of a depth PNG is sent exactly.
         #[test]
         fn png_steps_arrive_exactly(steps in proptest::collection::vec(0u16.., 15)) {
             let dir = tempfile::tempdir().unwrap();
@@ -163,7 +163,7 @@ mod tests {
             prop_assert_eq!(sent, steps);
         }
 
-        /// Every bit of an f32 array arrives; f64 is rounded once.
+        /// Every bit of an f32 array is sent; f64 is rounded once.
         #[test]
         fn npy_metres_arrive_exactly(metres in proptest::collection::vec(any::<f32>(), 6)) {
             let dir = tempfile::tempdir().unwrap();
@@ -182,7 +182,7 @@ mod tests {
             }
         }
 
-        /// Whatever a file holds, reading it ends in an answer.
+        /// Reading any bytes returns an error and does not panic.
         #[test]
         fn foreign_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300), npy in any::<bool>()) {
             let dir = tempfile::tempdir().unwrap();
@@ -194,9 +194,9 @@ mod tests {
         }
     }
 
-    /// What stands behind the numbers is not read, of an array so small that it came with the header, too.
+    /// Bytes after the numbers are not used, even if the array is so small that they were read with the header.
     #[test]
-    fn bytes_behind_an_array_are_left() {
+    fn bytes_after_an_array_are_ignored() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a_depth.npy");
         for (side, more) in [(1, 1), (1, 9000), (100, 7)] {
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn cut_files_say_so() {
+    fn truncated_files_are_errors() {
         let dir = tempfile::tempdir().unwrap();
         let map = DepthMap {
             width: 64,
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn an_array_that_claims_too_much_takes_no_memory() {
+    fn an_array_with_an_impossible_shape_is_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a_depth.npy");
         for shape in [

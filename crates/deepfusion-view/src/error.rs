@@ -1,4 +1,4 @@
-//! What can go wrong with showing results.
+//! Errors of showing results.
 
 mod content;
 
@@ -13,11 +13,11 @@ use {re_chunk::ChunkError, re_log_encoding::EncodeError};
 /// A result of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What can go wrong with showing results.
+/// An error of showing results.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is nothing at the path.
+    /// There is no file or folder at the path.
     #[error("{}: no such folder", path.display())]
     NoSuchFolder {
         /// The path given.
@@ -29,29 +29,29 @@ pub enum Error {
         /// The path given.
         path: PathBuf,
     },
-    /// The folder holds nothing that can be shown.
-    #[error("{}: nothing to show there: no NAME.json, NAME_depth.png, NAME_depth.npy or NAME_targets.json, and no training log", path.display())]
+    /// The folder contains nothing that can be shown.
+    #[error("{}: nothing to show: no NAME.json, NAME_depth.png, NAME_depth.npy or NAME_targets.json, and no training log", path.display())]
     NothingToShow {
         /// The folder.
         path: PathBuf,
     },
-    /// A run and predictions, where two of a kind are needed to be compared.
-    #[error("{}: holds {found}, which cannot stand beside {expected}", path.display())]
+    /// A run and predictions, which cannot be compared.
+    #[error("{}: contains {found}, which cannot be shown beside {expected}", path.display())]
     OtherKind {
         /// The second folder.
         path: PathBuf,
-        /// What it holds.
+        /// What it contains.
         found: FolderKind,
-        /// What the first holds.
+        /// What the first contains.
         expected: FolderKind,
     },
-    /// A training run, where frames are needed.
+    /// A training run, although frames are needed.
     #[error("{}: a training run has no frames", path.display())]
     NoFrames {
         /// The folder.
         path: PathBuf,
     },
-    /// A file that was not written to its end, because somebody asked to stop.
+    /// A file that was not completed, because the work was asked to stop.
     #[error("{}: not written: stopped after {done} of {}", path.display(), deepfusion_hint::count_of(*total, "frame"))]
     Stopped {
         /// The file that would have been written.
@@ -61,13 +61,13 @@ pub enum Error {
         /// Frames in all.
         total: usize,
     },
-    /// A frame that another viewer's format cannot hold.
+    /// A frame that cannot be written in the rerun viewer's format.
     #[cfg(feature = "rerun")]
     #[error("{}: cannot be written: {problem}", path.display())]
     Encoding {
         /// The file that would have been written.
         path: PathBuf,
-        /// Why.
+        /// Why not.
         problem: EncodingProblem,
     },
     /// A file or folder cannot be read or written.
@@ -78,7 +78,7 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
-    /// A file is not what its name says.
+    /// The content of a file does not match its name.
     #[error("{}: {problem}", path.display())]
     Content {
         /// The file.
@@ -89,14 +89,14 @@ pub enum Error {
     /// A picture or a depth PNG cannot be read.
     #[error(transparent)]
     Picture(#[from] deepfusion_images::Error),
-    /// Another program listens there.
+    /// Another program listens on the port.
     #[error("{address}: the port is in use")]
     PortInUse {
         /// Where the server was to listen.
         address: SocketAddr,
     },
-    /// The server cannot listen there.
-    #[error("{address}: cannot listen there: {source}")]
+    /// The server cannot listen on the address.
+    #[error("{address}: cannot listen on this address: {source}")]
     Listen {
         /// Where the server was to listen.
         address: SocketAddr,
@@ -105,22 +105,22 @@ pub enum Error {
     },
 }
 
-/// Why something cannot be logged: what the viewer's own libraries said.
+/// Why data cannot be written for the rerun viewer: the error of its libraries.
 #[cfg(feature = "rerun")]
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EncodingProblem {
-    /// It cannot be written.
+    /// Writing failed.
     #[error(transparent)]
     Encode(#[from] EncodeError),
-    /// It cannot be put together.
+    /// A chunk could not be built.
     #[error(transparent)]
     Chunk(#[from] ChunkError),
 }
 
 #[cfg(feature = "rerun")]
 impl EncodingProblem {
-    /// The failure of a file.
+    /// The error for the file at `path`.
     pub(crate) fn of(self, path: &std::path::Path) -> Error {
         match self {
             Self::Encode(EncodeError::Write(source)) => Error::file(path, source),
@@ -133,7 +133,7 @@ impl EncodingProblem {
 }
 
 impl Error {
-    /// An error of the system, named by file.
+    /// An error of the system for a file.
     pub(crate) fn file(path: &std::path::Path, source: std::io::Error) -> Self {
         Self::File {
             path: path.to_owned(),
@@ -141,7 +141,7 @@ impl Error {
         }
     }
 
-    /// A file that is not what it should be.
+    /// A file whose content is wrong.
     pub(crate) fn content(path: &std::path::Path, problem: impl Into<ContentProblem>) -> Self {
         Self::Content {
             path: path.to_owned(),
@@ -159,10 +159,9 @@ impl Hint for Error {
                 let folder = folder.unwrap_or(std::path::Path::new("."));
                 Some(format!("give its folder: {}", folder.display()))
             }
-            Self::NothingToShow { .. } => Some(
-                "make something to look at first: depth of images, targets or a training run"
-                    .into(),
-            ),
+            Self::NothingToShow { .. } => {
+                Some("predict some images, find targets or train a network first".into())
+            }
             Self::OtherKind { .. } => {
                 Some("give two folders of predictions, or two of training runs".into())
             }
@@ -172,12 +171,10 @@ impl Hint for Error {
             #[cfg(feature = "rerun")]
             Self::Encoding { .. } => None,
             Self::Picture(error) => error.hint(),
-            Self::PortInUse { .. } => {
-                Some("give another port, or port 0 for any that is free".into())
-            }
+            Self::PortInUse { .. } => Some("give another port, or port 0 for any free one".into()),
             Self::Listen { source, .. } => Some(match source.kind() {
                 std::io::ErrorKind::PermissionDenied => {
-                    "ports below 1024 belong to the system: give 8765".into()
+                    "give port 8765: ports below 1024 are reserved for the system".into()
                 }
                 _ => "give an address of this machine, such as 127.0.0.1 or 0.0.0.0".into(),
             }),

@@ -22,7 +22,7 @@ use crate::folder::{FrameFile, SmallFiles, Track, details_of, picture_of, target
 use crate::http::{Request, Response};
 use crate::{DepthFile, Error, Folder, FolderKind, assets, training};
 
-/// Frames that one answer of tracks may hold.
+/// Most frames in one answer of tracks.
 const MOST_TRACK_FRAMES: u64 = 256;
 
 /// The folders that are served, and for whom.
@@ -40,11 +40,11 @@ impl Routes {
 
     /// The answer to a request.
     pub(crate) fn answer(&self, request: &Request) -> Response {
-        // A page elsewhere may give its own name this machine's address, and then read what is served here as its own.
+        // Against DNS rebinding: another site could resolve its own name to this machine's address and then read what is served here.
         if self.local && !request.host.as_deref().is_none_or(is_this_machine) {
             return Response::problem(
                 403,
-                "this server answers to 127.0.0.1 and localhost alone",
+                "this server answers only to 127.0.0.1 and localhost",
                 None,
             );
         }
@@ -110,7 +110,7 @@ struct Colours {
     turbo: Vec<[u8; 3]>,
 }
 
-/// From near to far by the logarithm of metres, as the pictures that `predict` writes.
+/// Colours from near to far on a logarithmic scale, as in the pictures that `predict` writes.
 #[derive(Debug, Serialize)]
 struct ScaleColours {
     colours: Vec<[u8; 3]>,
@@ -129,20 +129,20 @@ struct Run {
 /// The targets of consecutive frames.
 #[derive(Debug, Serialize)]
 struct Tracks {
-    /// Place of the first frame.
+    /// Index of the first frame.
     from: usize,
-    /// One a frame; none where it has no targets.
+    /// One per frame; `None` for a frame without a file of targets.
     tracks: Vec<Option<Track>>,
 }
 
-/// A map's colours at 256 places evenly from 0 to 1.
+/// A map's colours at 256 values evenly spaced from 0 to 1.
 fn table(map: ColourMap) -> Vec<[u8; 3]> {
     (0..=255u8)
         .map(|i| map.colour(f32::from(i) / 255.0).0)
         .collect()
 }
 
-/// The depth scale's colours at 256 places evenly from near to far.
+/// The depth scale's colours at 256 depths from near to far, evenly spaced on its logarithmic scale.
 fn depth_colours(scale: &DepthScale) -> Vec<[u8; 3]> {
     let ratio = scale.far_m / scale.near_m;
     (0..=255u8)
@@ -196,7 +196,7 @@ fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
     }
 }
 
-/// The numbers of a depth or of its standard deviation.
+/// The response with the numbers of depth or of its standard deviation.
 fn map(folder: &Path, file: Option<&FrameFile>, missing: &str) -> Response {
     let Some(FrameFile { file, .. }) = file else {
         return Response::problem(404, missing, None);
@@ -215,7 +215,7 @@ fn sent(outcome: Result<Response, Error>) -> Response {
 }
 
 fn nothing() -> Response {
-    Response::problem(404, "nothing is served there", None)
+    Response::problem(404, "nothing is served at this address", None)
 }
 
 fn is_this_machine(host: &str) -> bool {

@@ -9,7 +9,7 @@ use crate::http::{self, Response};
 use crate::routes::Routes;
 use crate::{Error, Folder, Result};
 
-/// A browser opens six connections; this is for some tabs and phones.
+/// A browser opens six connections per page; this is enough for several tabs and phones.
 const MOST_CONNECTIONS: usize = 64;
 
 /// The address to listen on.
@@ -17,7 +17,7 @@ const MOST_CONNECTIONS: usize = 64;
 pub struct Settings {
     /// The address; an unspecified one means all networks.
     pub host: IpAddr,
-    /// The port; 0 takes any that is free.
+    /// The port; 0 takes any free one.
     pub port: u16,
 }
 
@@ -30,7 +30,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Listens, for one folder or two side by side; nothing is answered before [`Server::run_until`].
+    /// Starts to listen, to serve one folder or two side by side. Requests are answered only by [`Server::run_until`].
     ///
     /// # Errors
     /// [`Error::PortInUse`], [`Error::Listen`]; [`Error::OtherKind`] if one folder is a run and the other is not.
@@ -81,8 +81,8 @@ impl Server {
         if !self.address.ip().is_unspecified() {
             return None;
         }
-        // A datagram socket that is "connected" sends nothing; it only learns which of the machine's addresses leads outside.
-        // 192.0.2.1 belongs to nobody (RFC 5737).
+        // "Connecting" a datagram socket sends nothing; it only selects the machine's address on the route to the outside.
+        // 192.0.2.1 is reserved for documentation (RFC 5737).
         let probe = std::net::UdpSocket::bind(("0.0.0.0", 0)).ok()?;
         probe.connect(("192.0.2.1", 9)).ok()?;
         let ip = probe.local_addr().ok()?.ip();
@@ -124,8 +124,8 @@ impl Server {
             let mut stream = match accepted {
                 Ok((stream, _)) => stream,
                 Err(error) => {
-                    // Out of file handles, most likely: others will close theirs.
-                    tracing::warn!("a connection could not be taken: {error}");
+                    // Probably out of file handles, until other connections are closed.
+                    tracing::warn!("cannot accept a connection: {error}");
                     std::thread::sleep(Duration::from_millis(100));
                     continue;
                 }
@@ -143,11 +143,11 @@ impl Server {
                 .name("view".into())
                 .spawn(move || {
                     let _one = one;
-                    // A client that has gone is no failure of ours.
+                    // A client that disconnects is not an error.
                     let _ = http::serve(stream, &|request| routes.answer(request));
                 });
             if let Err(error) = spawned {
-                tracing::warn!("a connection could not be served: {error}");
+                tracing::warn!("cannot serve a connection: {error}");
             }
         }
     }

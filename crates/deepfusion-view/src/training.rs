@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::{ContentProblem, Error, Result};
 
-/// More rows than the page has columns for are thinned to this many.
+/// A longer log is thinned to this many rows, about as many as the page has pixels.
 const MOST_ROWS: usize = 2000;
 
 /// Whether a folder is a run: it has a log.
@@ -15,13 +15,13 @@ pub(crate) fn is_run(folder: &Path) -> bool {
     folder.join("log.csv").is_file()
 }
 
-/// Numbers of the log by column; none where a row has no finite one.
+/// Numbers of the log by column; `None` if a row has no finite one.
 type Columns = BTreeMap<String, Vec<Option<f64>>>;
 
-/// A run as the page gets it.
+/// A run as sent to the page.
 #[derive(Debug, Serialize)]
 pub(crate) struct TrainingRun {
-    /// The columns' names, in the log's order; without those that are zero, or nothing, throughout.
+    /// The columns' names, in the log's order, without those that are zero or empty throughout.
     columns: Vec<String>,
     /// The panels' file names.
     panels: Vec<String>,
@@ -31,11 +31,11 @@ pub(crate) struct TrainingRun {
     validation: Columns,
 }
 
-/// The log as columns, and the panels' names. A long log is thinned evenly for the steps; validations all stay.
+/// The log as columns, and the panels' names. The steps of a long log are thinned evenly; all validations are kept.
 pub(crate) fn read(folder: &Path) -> Result<TrainingRun> {
     let path = folder.join("log.csv");
     let failed = |e: csv::Error| Error::content(&path, e);
-    // A last line that is being written has too few fields: it is left out.
+    // A last line that is still being written has too few fields and is left out.
     let mut reader = csv::ReaderBuilder::new()
         .flexible(true)
         .from_path(&path)
@@ -82,7 +82,7 @@ pub(crate) fn read(folder: &Path) -> Result<TrainingRun> {
             .collect()
     };
     let (train, validation) = (table(&train), table(&validation.iter().collect::<Vec<_>>()));
-    // As in the report: a term that is off has no curve.
+    // As in the report, a term that is switched off has no curve.
     let has_curve = |name: &String| {
         let parts = [&train, &validation].into_iter();
         let numbers = parts.filter_map(|part| part.get(name)).flatten();
@@ -112,7 +112,7 @@ fn panels(folder: &Path) -> Vec<String> {
     names
 }
 
-/// A panel that the folder holds.
+/// Path of a panel, if the folder contains it.
 pub(crate) fn panel(folder: &Path, name: &str) -> Option<PathBuf> {
     let found = panels(folder).into_iter().find(|n| n == name)?;
     Some(folder.join("panels").join(found))

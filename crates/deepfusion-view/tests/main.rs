@@ -1,4 +1,4 @@
-//! The viewer: its server, its page, Rerun.
+//! The viewer's server, its page, and its files for Rerun.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! The page in a real browser: what it shows is what the files hold. Without a Chromium this says so and passes.
+//! The page in a real browser: it shows the content of the files. Without a Chromium, the tests print that and pass.
 
 #![cfg(unix)]
 
@@ -20,7 +20,7 @@ fn opened(server: &Running) -> Option<Browser> {
     Some(browser)
 }
 
-/// Moves the mouse onto a pixel of the depth pane, and gives what the page then says.
+/// Moves the mouse onto a pixel of a pane, and returns the metres and the text that the page then shows.
 fn reading_at(browser: &mut Browser, pane: &str, x: u32, y: u32) -> (f64, String) {
     let place = format!(
         "(() => {{ const pane = deepfusion.app.kinds[0].{pane}, at = pane.layout(), box = pane.canvas.getBoundingClientRect(); \
@@ -29,7 +29,7 @@ fn reading_at(browser: &mut Browser, pane: &str, x: u32, y: u32) -> (f64, String
     );
     let reading =
         format!("(document.getElementById('tip').innerText + '\\n').includes('pixel {x}, {y}\\n')");
-    // The panes take their shapes from the first pictures: a place may move once.
+    // The panes take their shapes from the first pictures, so positions may change once.
     let begin = Instant::now();
     loop {
         let at = browser.value(&place);
@@ -50,7 +50,7 @@ fn reading_at(browser: &mut Browser, pane: &str, x: u32, y: u32) -> (f64, String
 }
 
 #[test]
-fn the_page_shows_what_the_files_hold() {
+fn the_page_shows_the_content_of_the_files() {
     let folder = results(FRAMES);
     let server = Running::start(folder.path(), None);
     let Some(mut browser) = opened(&server) else {
@@ -58,7 +58,7 @@ fn the_page_shows_what_the_files_hold() {
     };
     assert_eq!(browser.complaints, Vec::<String>::new());
 
-    // The cloud: points in the pictures' colour, which nothing else has.
+    // The cloud's points have the pictures' colour, which nothing else has.
     let seen = browser.value(
         "(() => { const view = deepfusion.app.kinds[0].cloud; view.draw(true); const { gl, canvas } = view; \
          const pixels = new Uint8Array(4 * canvas.width * canvas.height); \
@@ -68,7 +68,7 @@ fn the_page_shows_what_the_files_hold() {
     );
     assert!(seen.as_u64().unwrap() > 2000, "{seen} pixels of the cloud");
 
-    // Metres under the pointer: the file's, to the last digit, on either picture.
+    // Metres under the pointer are those of the file, to the last digit, on either picture.
     for (x, y) in [(10, 5), (0, 47), (95, 0), (48, 24), (71, 33)] {
         for pane in ["depth", "picture"] {
             let (metres, text) = reading_at(&mut browser, pane, x, y);
@@ -104,14 +104,14 @@ fn the_page_shows_what_the_files_hold() {
         "the last frame's own depth"
     );
 
-    // Where the target was: half a metre nearer a frame, while the camera drove 0.2 m.
+    // Past positions of the target: half a metre nearer in each frame, while the camera drives 0.2 m.
     browser.wait_for("deepfusion.app.runs[0].history(11, 4, () => {}).length === 4");
     let track = browser
         .value("deepfusion.app.runs[0].history(11, 4, () => {}).map(f => f.targets[0][1][2])");
     let track: Vec<f64> = serde_json::from_value(track).unwrap();
     assert_eq!(track, [10.0, 9.5, 9.0, 8.5]);
 
-    // What is held stays within its bounds.
+    // The cache stays within its limits.
     let held = browser.value(
         "(async () => { const { runs: [run] } = deepfusion.app; for (const key of [...run.frames.entries.keys()]) run.frames.delete(key); \
          await deepfusion.app.seek(0); run.frames.most = 3 * run.at(0).bytes; \
@@ -123,7 +123,7 @@ fn the_page_shows_what_the_files_hold() {
     assert_eq!(
         (&held[2], &held[3]),
         (&json!("000011"), &json!(96)),
-        "what is on show is kept"
+        "the frame on screen is kept"
     );
 
     browser.key("?");
@@ -131,8 +131,8 @@ fn the_page_shows_what_the_files_hold() {
     assert_eq!(browser.complaints, Vec::<String>::new());
 }
 
-/// The eight corners of a box in the picture against nalgebra's rotation and the crate's own camera; then that its lines are painted there.
-fn boxes_are_where_they_belong(browser: &mut Browser) {
+/// Compares the eight corners of a box in the picture with nalgebra's rotation and the crate's camera, and checks that its lines are painted there.
+fn boxes_are_in_the_right_place(browser: &mut Browser) {
     let [fx, fy, cx, cy] = CAMERA;
     let camera = Intrinsics {
         fx,
@@ -178,7 +178,7 @@ fn boxes_are_where_they_belong(browser: &mut Browser) {
             "{corner} is {off} pixels from the nearest of {pixels:?}"
         );
     }
-    // An upright edge's middle has the colour of dynamic targets.
+    // The middle of a vertical edge has the colour of dynamic targets.
     let colour = browser.value(&format!(
         "(() => {{ const {{ app }} = deepfusion, pane = app.kinds[0].picture, at = pane.layout(), {{ canvas }} = pane; \
          app.point(null); pane.draw(); \
@@ -197,7 +197,7 @@ fn boxes_are_where_they_belong(browser: &mut Browser) {
 }
 
 #[test]
-fn a_broken_frame_says_so_and_a_new_one_comes() {
+fn a_broken_frame_is_reported_and_new_ones_appear() {
     let folder = results(3);
     let depth = folder.path().join("000001_depth.png");
     let whole = std::fs::read(&depth).unwrap();
@@ -215,7 +215,7 @@ fn a_broken_frame_says_so_and_a_new_one_comes() {
     ));
     browser.key("ArrowRight");
     browser.wait_for(&format!(
-        "{}.innerText.includes('half-written')",
+        "{}.innerText.includes('incomplete')",
         problem("picture")
     ));
     browser.key("Home");
@@ -223,7 +223,7 @@ fn a_broken_frame_says_so_and_a_new_one_comes() {
         "{}.hidden && deepfusion.app.drawnFrame === '000000'",
         problem("depth")
     ));
-    // Mended, and one more.
+    // Repaired, and one more frame.
     std::fs::write(&depth, &whole).unwrap();
     write_frame(folder.path(), 3);
     browser.wait_for("deepfusion.app.runs[0].length === 4");
@@ -237,9 +237,9 @@ fn a_broken_frame_says_so_and_a_new_one_comes() {
 }
 
 #[test]
-fn two_runs_stand_side_by_side() {
+fn two_runs_are_shown_side_by_side() {
     let (first, second) = (results(4), tempfile::tempdir().unwrap());
-    // The second lacks frame 0, and all it has is a metre farther.
+    // The second lacks frame 0, and its depth is a metre larger.
     for i in 1..4 {
         write_frame(second.path(), i);
         let map =
@@ -282,7 +282,7 @@ fn two_runs_stand_side_by_side() {
     assert_eq!(browser.complaints, Vec::<String>::new());
 }
 
-/// Sigma of frame `i`: a fiftieth of the depth on the left, nine tenths of it on the right.
+/// Writes sigma of frame `i`: a fiftieth of the depth on the left, nine tenths of it on the right.
 fn write_sigma(folder: &std::path::Path, i: usize, (width, height): (u32, u32)) {
     let at = |y: u32, x: u32| {
         let share = if x < width / 2 { 0.02 } else { 0.9 };
@@ -295,7 +295,7 @@ fn write_sigma(folder: &std::path::Path, i: usize, (width, height): (u32, u32)) 
 }
 
 #[test]
-fn what_is_unsure_fades() {
+fn uncertain_pixels_fade() {
     let folder = results(3);
     write_sigma(folder.path(), 0, SIZE);
     write_sigma(folder.path(), 1, (SIZE.0 / 2, SIZE.1));
@@ -303,7 +303,7 @@ fn what_is_unsure_fades() {
     let Some(mut browser) = opened(&server) else {
         return;
     };
-    // Painted pixels of the depth, left and right, and how many of the cloud's there are.
+    // A painted pixel of depth on the left and on the right, and the number of the cloud's pixels.
     let seen = "(() => { const { depth, cloud } = deepfusion.app.kinds[0]; depth.draw(); \
          const pixel = (x, y) => [...depth.sheet.getContext('2d').getImageData(x, y, 1, 1).data]; \
          cloud.draw(true); const { gl, canvas } = cloud, pixels = new Uint8Array(4 * canvas.width * canvas.height); \
@@ -314,12 +314,12 @@ fn what_is_unsure_fades() {
     browser.key("u");
     browser.wait_for("deepfusion.app.options.fade && [...document.querySelectorAll('#tools button')].some(b => b.textContent === 'Fade' && b.ariaPressed === 'true')");
     let after = browser.value(seen);
-    assert_eq!(after[0], before[0], "what is sure stays");
+    assert_eq!(after[0], before[0], "certain pixels do not fade");
     assert_ne!(after[1], before[1]);
     assert_eq!(
         after[1],
         json!([40, 40, 44, 255]),
-        "what is not goes over into what has no depth"
+        "uncertain pixels fade into the colour of no depth"
     );
     let [all, sure] = [&before[2], &after[2]].map(|points| points.as_u64().unwrap());
     assert!(

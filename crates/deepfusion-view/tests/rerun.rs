@@ -21,7 +21,7 @@ use re_sdk_types::datatypes::{ChannelDatatype, Quaternion};
 use re_sdk_types::{Component, archetypes as a};
 use serde_json::json;
 
-/// What a file holds: for each entity its rows, in the order they were written.
+/// A file's content: the rows of each entity, in the order they were written.
 struct Read {
     rows: BTreeMap<String, Vec<Chunk>>,
     application: String,
@@ -90,7 +90,7 @@ fn write(folder: &Path, to: &Path) -> RerunReport {
 }
 
 #[test]
-fn what_was_written_comes_back() {
+fn a_written_file_can_be_read_back() {
     let folder = results(3);
     let file = folder.path().join("out.rrd");
     let reported = Cell::new(Vec::new());
@@ -129,7 +129,7 @@ fn what_was_written_comes_back() {
             ("/world/camera/image/rgb", 3),
             ("/world/camera/targets", 3),
             ("/world/camera/velocities", 3),
-            // A way needs two places.
+            // A path needs two positions.
             ("/world/tracks", 2),
         ]
     );
@@ -202,7 +202,7 @@ fn depth_is_in_the_numbers_of_its_file() {
 }
 
 #[test]
-fn targets_stand_where_the_page_draws_them() {
+fn targets_are_where_the_page_draws_them() {
     let folder = results(3);
     let file = folder.path().join("out.rrd");
     write(folder.path(), &file);
@@ -214,7 +214,7 @@ fn targets_stand_where_the_page_draws_them() {
     assert_eq!(centre, [Translation3D::from([1.0_f32, 0.5, 13.0])]);
     let turn = read.get::<RotationQuat>(entity, 2, a::Boxes3D::descriptor_quaternions());
     let Quaternion([x, y, z, w]) = turn[0].0;
-    // KITTI's rotation_y: the length points along (cos, 0, -sin). A unit quaternion's image of the x axis:
+    // KITTI's rotation_y: the length points along (cos, 0, -sin). The x axis rotated by a unit quaternion:
     let ahead = [
         1.0 - 2.0 * (y * y + z * z),
         2.0 * (x * y + w * z),
@@ -272,7 +272,7 @@ fn a_turned_camera_has_its_columns() {
 }
 
 #[test]
-fn bad_frames_are_named_and_show_nothing_of_the_frame_before() {
+fn bad_frames_are_named_and_show_nothing_of_the_previous_frame() {
     let folder = results(3);
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("000001_depth.png"), "cut off").unwrap();
@@ -292,7 +292,7 @@ fn bad_frames_are_named_and_show_nothing_of_the_frame_before() {
         panic!("{:?}", report.problems)
     };
     assert!(
-        picture.contains("the picture is not there any more"),
+        picture.contains("the picture no longer exists"),
         "{picture}"
     );
     assert!(depth.contains("000001_depth.png"), "{depth}");
@@ -322,7 +322,7 @@ fn bad_frames_are_named_and_show_nothing_of_the_frame_before() {
         "already cleared"
     );
     assert!(read.at("/world/camera/targets", 2).is_some());
-    // Its way is not known without targets: the camera is the world, not where it was before.
+    // Without targets the camera's motion is unknown: its pose is the identity, not the previous one.
     let place = a::Transform3D::descriptor_translation();
     let place = read.get::<Translation3D>("/world/camera", 1, place);
     assert_eq!(place, [Translation3D::from([0.0_f32; 3])]);
@@ -354,7 +354,7 @@ fn stopping_leaves_nothing_behind() {
         "{outcome:?}"
     );
     assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 0);
-    // Nor does a folder that is not there.
+    // Nor does writing to a folder that does not exist.
     let nowhere = out.path().join("nowhere/out.rrd");
     let outcome = write_rerun(
         &Folder::open(folder.path()).unwrap(),

@@ -1,4 +1,4 @@
-//! What the server answers, to a plain client.
+//! The server's answers to a plain client.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -18,7 +18,7 @@ fn problems(frame: &Value) -> String {
 }
 
 #[test]
-fn depth_arrives_as_it_lies_in_the_file() {
+fn depth_is_sent_as_it_is_in_the_file() {
     let folder = results(3);
     let metres: Vec<f32> = (0..12)
         .map(|i| [0.1, f32::NAN, 0.0, 80.25][i % 4] * (1.0 + i as f32))
@@ -52,7 +52,7 @@ fn depth_arrives_as_it_lies_in_the_file() {
     assert_eq!(body[16..], expected);
 }
 
-/// What a sidecar does not name was made before it, perhaps by another camera.
+/// An output that the sidecar does not name is older, and perhaps of another camera.
 #[test]
 fn only_outputs_that_the_sidecar_names_are_shown() {
     let folder = results(2);
@@ -76,12 +76,12 @@ fn only_outputs_that_the_sidecar_names_are_shown() {
         let details = server.json(&format!("/api/runs/0/frame/{frame}"));
         let (status, body) = server.get(&format!("/api/runs/0/depth/{frame}"));
         assert_eq!(status, 200);
-        // 0 are steps of a PNG, 1 metres.
+        // Code 0 means steps of a PNG, 1 metres.
         (details["depth"].clone(), body[12])
     };
     assert_eq!(depth_of("000000"), (json!("000000_depth.png"), 0));
     assert_eq!(server.get("/api/runs/0/sigma/000000").0, 404);
-    // One of another program names none: all is shown.
+    // Another program's sidecar names no outputs: all are shown.
     assert_eq!(depth_of("000001"), (json!("000001_depth.npy"), 1));
     assert_eq!(server.get("/api/runs/0/sigma/000001").0, 200);
 }
@@ -130,7 +130,7 @@ fn keys(object: &Value) -> String {
 }
 
 #[test]
-fn what_is_not_known_of_a_frame_is_left_out_or_null() {
+fn unknown_fields_of_a_frame_are_left_out_or_null() {
     let folder = results(2);
     for file in ["000001.json", "000001_image.png", "000001_targets.json"] {
         std::fs::remove_file(folder.path().join(file)).unwrap();
@@ -161,7 +161,7 @@ fn what_is_not_known_of_a_frame_is_left_out_or_null() {
 }
 
 #[test]
-fn the_watch_over_the_metres_is_shown_of_predictions_too() {
+fn the_scale_monitor_is_shown_for_predictions_too() {
     let folder = results(2);
     let answer = json!({"ratio": 1.08, "state": "drift", "correction": 1.02});
     write_sidecar(folder.path(), "000001", &json!({"scale_monitor": answer}));
@@ -173,9 +173,9 @@ fn the_watch_over_the_metres_is_shown_of_predictions_too() {
     assert_eq!(frame["scale_monitor"], answer);
 }
 
-/// Whichever program wrote the sidecar.
+/// Whichever version wrote the sidecar.
 #[test]
-fn what_the_metres_are_worth_is_passed_on() {
+fn the_verdict_about_the_scale_is_passed_on() {
     let folder = results(2);
     let scale = json!({"bias": 0.01, "ci95": [-0.02, 0.04], "verdict": "trusted"});
     let now = json!({"camera_known": true, "scale": scale, "scale_trusted": null});
@@ -192,7 +192,7 @@ fn what_the_metres_are_worth_is_passed_on() {
 }
 
 #[test]
-fn what_is_broken_says_so_and_the_rest_goes_on() {
+fn broken_files_are_reported_and_the_rest_is_shown() {
     let folder = results(7);
     let at = |file: &str| folder.path().join(file);
     let cut = |file: &str| {
@@ -214,18 +214,15 @@ fn what_is_broken_says_so_and_the_rest_goes_on() {
     let server = Running::start(folder.path(), None);
     let problems_of = |name: &str| problems(&server.json(&format!("/api/runs/0/frame/{name}")));
     for (name, expected) in [
-        ("000000", "000000.json: half-written, or cut off"),
+        ("000000", "000000.json: incomplete or truncated"),
         ("000001", ""),
-        ("000002", "000002_targets.json: half-written, or cut off"),
-        (
-            "000003",
-            "gone/street.mp4: the picture is not there any more",
-        ),
+        ("000002", "000002_targets.json: incomplete or truncated"),
+        ("000003", "gone/street.mp4: the picture no longer exists"),
         ("000004", "depth is 96x48, the sidecar says 640x192"),
         ("000004", "the picture is 96x48, the sidecar says 640x192"),
-        ("000005", "the sidecar's camera cannot be: fx is 0"),
+        ("000005", "the sidecar's camera is impossible: fx is 0"),
         ("000006", ""),
-        ("coming", "half-written, or cut off"),
+        ("coming", "incomplete or truncated"),
     ] {
         let text = problems_of(name);
         assert!(
@@ -247,7 +244,7 @@ fn what_is_broken_says_so_and_the_rest_goes_on() {
     assert_eq!(
         server.get("/api/runs/0/depth/000000").0,
         200,
-        "the sidecar alone is broken"
+        "only the sidecar is broken"
     );
     let index = server.json("/api/runs/0/index");
     assert_eq!(index["names"].as_array().unwrap().len(), 8, "{index}");
@@ -255,7 +252,7 @@ fn what_is_broken_says_so_and_the_rest_goes_on() {
         index["series"]["problem"][0]
             .as_str()
             .unwrap()
-            .contains("half-written")
+            .contains("incomplete")
     );
 }
 
@@ -272,7 +269,7 @@ fn nothing_outside_the_folders_is_served() {
     .unwrap();
     std::fs::write(outer.path().join("secret_depth.png"), "hidden words").unwrap();
     std::fs::write(outer.path().join("secret.txt"), "hidden words").unwrap();
-    // A folder from elsewhere may name any file as its picture: what is no picture is not sent.
+    // A folder from elsewhere may name any file as its picture; files that are not pictures are not sent.
     std::fs::remove_file(folder.join("000001_image.png")).unwrap();
     write_sidecar(
         &folder,
@@ -308,7 +305,7 @@ fn nothing_outside_the_folders_is_served() {
 }
 
 #[test]
-fn only_questions_of_this_machine_are_answered() {
+fn only_requests_from_this_machine_are_answered() {
     let folder = results(1);
     let server = Running::start(folder.path(), None);
     let status = |head: &str| {
@@ -338,7 +335,7 @@ fn only_questions_of_this_machine_are_answered() {
 }
 
 #[test]
-fn a_connection_stays_open_for_the_next_question() {
+fn a_connection_stays_open_for_the_next_request() {
     let folder = results(2);
     let server = Running::start(folder.path(), None);
     let mut stream = TcpStream::connect(server.address).unwrap();
@@ -367,7 +364,7 @@ fn a_folder_that_grows_is_followed() {
     write_frame(folder.path(), 2);
     let grown = server.json(&known);
     assert_eq!(grown["names"], json!(["000000", "000001", "000002"]));
-    // A file that is replaced makes its frame another one.
+    // Replacing a file changes its frame's revision.
     let revision = grown["revisions"][0].clone();
     let spare = folder.path().join(".spare");
     std::fs::copy(folder.path().join("000002_depth.png"), &spare).unwrap();
@@ -383,7 +380,7 @@ fn a_folder_that_grows_is_followed() {
 }
 
 #[test]
-fn folders_that_cannot_be_shown_say_why() {
+fn folders_that_cannot_be_shown_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let of = |path: &std::path::Path| Folder::open(path).unwrap_err();
     let nowhere = of(&folder.path().join("nowhere"));
@@ -394,7 +391,7 @@ fn folders_that_cannot_be_shown_say_why() {
         empty
             .hint()
             .unwrap()
-            .contains("make something to look at first"),
+            .contains("predict some images, find targets or train a network first"),
         "{empty}"
     );
     let file = folder.path().join("a.txt");
@@ -426,7 +423,7 @@ fn a_run_shows_its_curve_and_panels() {
     image::RgbImage::new(4, 4)
         .save(run.path().join("panels/000034.png"))
         .unwrap();
-    // The last line is being written.
+    // The last line is still being written.
     let log = "step,split,total,speed,flow\n1,train,0.5,1,0\n2,train,0.4,NaN,0\n2,validation,0.45,,\n3,train,0.3";
     std::fs::write(run.path().join("log.csv"), log).unwrap();
     let server = Running::start(run.path(), None);
@@ -435,7 +432,7 @@ fn a_run_shows_its_curve_and_panels() {
         answer["train"],
         json!({"step": [1.0, 2.0], "total": [0.5, 0.4], "speed": [1.0, null], "flow": [0.0, 0.0]})
     );
-    // What is zero throughout is not drawn.
+    // A column that is zero throughout is not drawn.
     assert_eq!(answer["columns"], json!(["step", "total", "speed"]));
     assert_eq!(answer["validation"]["total"], json!([0.45]));
     assert_eq!(answer["panels"], json!(["000034.png"]));
@@ -459,11 +456,11 @@ fn a_run_shows_its_curve_and_panels() {
         ) && error.hint().is_some(),
         "{error}"
     );
-    let said = "holds predictions, which cannot stand beside a training run";
+    let said = "contains predictions, which cannot be shown beside a training run";
     assert!(error.to_string().ends_with(said), "{error}");
 }
 
-/// What this process holds, in MiB; where the system does not say, nothing is checked.
+/// Resident memory of this process in MiB; `None` if the system does not report it.
 fn resident_mib() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/self/statm").ok()?;
     let pages: f64 = text.split(' ').nth(1)?.parse().ok()?;
@@ -471,9 +468,9 @@ fn resident_mib() -> Option<f64> {
 }
 
 #[test]
-fn memory_does_not_grow_with_what_was_sent() {
+fn memory_does_not_grow_with_the_bytes_sent() {
     let folder = tempfile::tempdir().unwrap();
-    // A megabyte a frame.
+    // A megabyte per frame.
     ndarray_npy::write_npy(
         folder.path().join("a_depth.npy"),
         &ndarray::Array2::<f32>::ones((512, 512)),
@@ -488,7 +485,7 @@ fn memory_does_not_grow_with_what_was_sent() {
     let before = resident_mib();
     ask(300);
     if let (Some(before), Some(after)) = (before, resident_mib()) {
-        // Other tests run beside this one, in the same process.
+        // Other tests run in the same process at the same time.
         assert!(
             after - before < 60.0,
             "{before} MiB before 300 frames of a MiB, {after} MiB after"

@@ -1,4 +1,4 @@
-//! What is in a ROS bag, and the first stamp of each stream.
+//! Lists the topics of a ROS bag, and the time of each one's first message.
 //!
 //! ```text
 //! cargo run --release --example bag_streams -- DRIVE.bag

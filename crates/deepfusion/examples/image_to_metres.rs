@@ -1,4 +1,4 @@
-//! Depth in metres of a photo, its point cloud and a picture of it.
+//! Predicts depth in metres from a photo, and writes a picture of it and its point cloud.
 //!
 //! ```text
 //! cargo run --release --example image_to_metres -- PHOTO [NETWORK]
@@ -19,7 +19,7 @@ fn main() -> Result<()> {
     let photo = PathBuf::from(arguments.next().context("usage: image_to_metres PHOTO")?);
     let network = arguments.next().unwrap_or_else(|| "street".into());
 
-    // The lens is known where the photo's EXIF says it; otherwise the metres are a guess.
+    // The lens is known if the photo's EXIF data has it; otherwise the metres are a guess.
     let seen = load_photo(&photo)?;
     if seen.intrinsics.is_none() {
         eprintln!("no focal length in the photo's EXIF: the metres are a guess");

@@ -6,7 +6,7 @@ use deepfusion::geometry::Intrinsics;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What all layouts share lies in the dataset; this is the rest, read when it is asked for. More can be said, such as ground truth.
+/// The part of a recording that depends on the layout and is read on demand. It can also provide more, such as ground truth.
 #[derive(Debug)]
 struct NamedByTime {
     folder: PathBuf,
@@ -40,7 +40,7 @@ fn main() -> Result<()> {
     let (_, first) = images.first().context("no image is named by its time")?;
     let size = data::image_size(first)?;
     let camera = Intrinsics::centred(f64::from(size.0) / 2.0, size);
-    let assumed = "the camera is taken to be 90 degrees wide";
+    let assumed = "a field of view of 90 degrees is assumed for the camera";
     let warnings = vec![DataWarning::Other(assumed.into())];
     let frame = |(number, (ms, path)): (usize, (u64, PathBuf))| Frame {
         drive: "own".into(),
@@ -54,6 +54,6 @@ fn main() -> Result<()> {
     let dataset = Dataset::new(parts, Arc::new(NamedByTime { folder, warnings }));
     println!("warnings: {:?}", dataset.warnings());
     let (frames, pairs) = (dataset.frames().len(), dataset.snippets(&[1], 0.5)?.len());
-    println!("{frames} frames, {pairs} pairs to learn from");
+    println!("{frames} frames, {pairs} pairs to train on");
     Ok(())
 }

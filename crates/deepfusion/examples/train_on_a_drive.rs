@@ -1,4 +1,4 @@
-//! Learns metric depth from a drive, starting from the network that comes with the library.
+//! Trains metric depth on a drive, starting from the network that comes with the library.
 //!
 //! ```text
 //! cargo run --release --example train_on_a_drive -- DRIVE RUN [STEPS]
@@ -24,7 +24,7 @@ fn main() -> Result<()> {
     // The preset that the network was built from.
     let mut config = Preset::Light.config_on(Compute::Processor);
     config.canonical_focal_px = start.config.canonical_focal_px;
-    // What the run began from belongs to what it saw.
+    // The network that a run started from is part of its training data's record.
     config.init = Some("street".into());
     config.init_sha256 = source.packed_sha256().map(Into::into);
     config.view_motion = ViewMotion::Vehicle;

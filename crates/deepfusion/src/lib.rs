@@ -14,7 +14,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let street = sim::Simulation::new(&sim::SimConfig { frames: 1, ..Default::default() })?;
 //! let (image, camera) = (street.frame(0).rgb, street.intrinsics()); // or data::load_photo("street.jpg")
-//! let mut estimator = DepthEstimator::load("tiny")?; // `street` is the better one; or a run folder
+//! let mut estimator = DepthEstimator::load("tiny")?; // or the better network "street", or a run folder
 //! let depth = estimator.estimate(&image, Some(&camera))?.depth();
 //! let middle = depth.data[depth.data.len() / 2 + depth.width / 2];
 //! println!("{}x{} pixels, {middle:.1} m in the middle", depth.width, depth.height);

@@ -1,5 +1,5 @@
-//! The examples do what they say, on simulated drives. `cargo test` builds them; with `--test examples` alone it does not, and
-//! this says so.
+//! The examples work on simulated drives. `cargo test` builds them; with `--test examples` it does not, and these tests print that
+//! and pass.
 
 use std::error::Error;
 use std::ops::ControlFlow;
@@ -11,7 +11,7 @@ use deepfusion::sim::{BagSettings, SimConfig, Simulation, write_bag, write_kitti
 
 type Result<T = ()> = std::result::Result<T, Box<dyn Error>>;
 
-/// What an example prints; `None` where it is not built.
+/// Output of an example; `None` if it is not built.
 fn run(example: &str, arguments: &[&Path]) -> Result<Option<String>> {
     // target/debug/deps/examples-0123 is beside target/debug/examples.
     let mut folder = std::env::current_exe()?;
@@ -71,7 +71,7 @@ fn a_drive_becomes_a_run() -> Result {
 }
 
 #[test]
-fn a_bag_says_its_streams() -> Result {
+fn the_streams_of_a_bag_are_listed() -> Result {
     let folder = tempfile::tempdir()?;
     let settings = BagSettings::default();
     let bag = write_bag(&street(3)?, folder.path(), &settings, &mut |_, _| {
@@ -85,7 +85,7 @@ fn a_bag_says_its_streams() -> Result {
 }
 
 #[test]
-fn a_layout_of_ones_own_is_a_dataset() -> Result {
+fn an_own_layout_is_a_dataset() -> Result {
     let folder = tempfile::tempdir()?;
     let drive = drive(&folder.path().join("street"), 4)?;
     let own = folder.path().join("own");

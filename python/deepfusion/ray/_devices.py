@@ -15,9 +15,9 @@ def of_workers(device: str | None, gpus: float) -> str:
         device = "auto" if gpus else "cpu"
     _native.check_device(device)
     if gpus and device == "cpu":
-        raise ValueError('device: "cpu" leaves the GPU idle that each worker is given')
+        raise ValueError('device: with "cpu", the GPU that each worker is given would be idle')
     if gpus and device == "auto" and deepfusion.devices() == ["cpu"]:
-        # Raises: the GPUs that Ray counts are mostly NVIDIA's.
+        # This raises an error about CUDA: the GPUs that Ray counts are mostly NVIDIA's.
         _native.check_device("cuda")
     return device
 

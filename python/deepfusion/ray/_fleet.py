@@ -108,12 +108,12 @@ _EMPTY: dict[Callable[[str], Row], Row] = {
 
 
 def _look(look: Callable[[str], Row], url: str, options: dict[str, Any]) -> Row:
-    # One core, as the task asks for. Read by the pool of threads when it is first used, that is below.
+    # One core, as the task requests. The pool of threads reads this when it is first used, below.
     os.environ["RAYON_NUM_THREADS"] = "1"
     try:
         with Sources(options).local_recording(url) as path:
             return {"recording": url, **look(path), "failed": None}
-    except Exception as error:  # Each file system has errors of its own; the other recordings are not to suffer by them.
+    except Exception as error:  # File systems raise their own errors, which must not affect the other recordings.
         return _failed(look, url, error)
 
 
@@ -142,7 +142,7 @@ def _each(
             i = running.pop(one)
             try:
                 rows[i] = ray.get(one)
-            except RayError as error:  # Its process died each time.
+            except RayError as error:  # Its process died at each attempt.
                 rows[i] = _failed(look, given[i], error)
             yield
 

@@ -35,11 +35,11 @@ _LOG = logging.getLogger(__name__)
 
 _ENDINGS = {"depth-png": "_depth.png", "npy": "_depth.npy", "sigma": "_sigma.npy", "confidence": "_confidence.npy"}
 
-# Images that a worker takes at once: enough that reading, network and writing overlap, few enough that little is done again
-# where a worker dies.
+# Images that a worker takes at once: enough that reading, network and writing overlap, few enough that little must be repeated
+# if a worker dies.
 _BATCH = 16
 
-# Ray's plan of a job grows with its blocks.
+# Ray's plan of a job grows with the number of blocks.
 _MOST_BLOCKS = 4000
 
 
@@ -91,11 +91,11 @@ class _Job:
         named = ("precision", "data_set", "focal_correction", "stretch", "weights")
         made = {name: asked[name] for name in named}
         made["version"] = deepfusion.__version__
-        # A run may be mounted elsewhere: its weights tell it.
+        # A run may be mounted at different paths, so it is identified by its weights.
         made["model"] = self.model if self.weights is None else None
         made["intrinsics"] = None if self.intrinsics is None else list(self.intrinsics)
         made["save"] = list(self.save)
-        # Absent where there is one prediction, as in what was made before there could be more.
+        # Absent for single predictions, as in outputs of versions that had no others.
         if self.post_process is not None:
             made["post_process"] = self.post_process
         return made
@@ -105,7 +105,7 @@ class _Worker:
     """One network in one process."""
 
     def __init__(self, job: _Job) -> None:
-        # Read by the pool of threads when it is first used, that is below.
+        # The pool of threads reads this when it is first used, below.
         os.environ["RAYON_NUM_THREADS"] = str(job.threads)
         self.job = job
         self.made_with = job.made_with()
@@ -119,13 +119,13 @@ class _Worker:
             try:
                 self.model = deepfusion.load(model, precision=job.precision, data_set=job.data_set, device=job.device)
             except deepfusion.DeepFusionError as error:
-                # Raised here it would end the job as the death of a worker: the caller is to get the error itself.
+                # Raised here, it would look like the death of a worker. It is kept for the caller instead.
                 self.refused = error
                 return
-        # What "auto" came to on this machine. A GPU's last digits are its own.
+        # The backend that "auto" chose on this machine. Results of different backends differ in the last digits.
         opened = self.model.device.partition(":")[0]
         if job.gpus and opened == "cpu":
-            raise RuntimeError("the GPU of this worker is not used: this machine's package has no backend that finds it")
+            raise RuntimeError("the GPU of this worker cannot be used: no backend of this machine's package finds it")
         if opened != "cpu":
             self.made_with["device"] = opened
         self.counted = metrics.Counter("deepfusion_images", "Images by outcome", ("outcome",))
@@ -140,12 +140,12 @@ class _Worker:
         todo: list[tuple[int, dict[str, Any]]] = []
         for i, (url, name) in enumerate(rows):
             try:
-                # Before it is read: a change in between is then noticed by the next job.
+                # Taken before the image is read, so that the next job notices a change in between.
                 mark = self.sources.mark(url)
                 there = self.there(url, name, mark)
                 if self.job.overwrite and there != ("done", ""):
                     there = None
-            except Exception as error:  # Whatever a file system raises is that image's failure alone.
+            except Exception as error:  # Any error of a file system is only this image's failure.
                 outcomes[i] = ("failed", _reason(error))
                 continue
             if there is None:
@@ -191,20 +191,20 @@ class _Worker:
             files = list(zip(sidecar["files"], sidecar["file_bytes"], sidecar["file_crc32"], strict=True))
             of, when, made_with = sidecar["image"], sidecar["image_file"], sidecar["made_with"]
         except (ValueError, KeyError, TypeError):
-            return "failed", f"{name}.json: not a sidecar of such a job; overwrite=True replaces it"
+            return "failed", f"{name}.json: not a sidecar of this function; overwrite=True replaces it"
         if of != url:
-            return "failed", f"{name}.json: is of another image, {of}; choose another output, or overwrite=True"
+            return "failed", f"{name}.json: belongs to another image, {of}; choose another output, or overwrite=True"
         if when != mark:
-            return "failed", "the image has changed since its depth was made; overwrite=True makes it anew"
+            return "failed", "the image has changed since its depth was predicted; overwrite=True predicts it again"
         if made_with != self.made_with:
             differs = [key for key in {**self.made_with, **made_with} if made_with.get(key) != self.made_with.get(key)]
-            return "failed", f"its depth was made with another {', '.join(differs)}; overwrite=True makes it anew"
+            return "failed", f"its depth was predicted with another {', '.join(differs)}; overwrite=True predicts it again"
         parent = name.rpartition("/")[0]
         for file, size, crc32 in files:
             file = f"{parent}/{file}" if parent else file
             if self.folder.size(file) != size:
                 return None
-            # An object store keeps no half of an upload; a disk may have zeros after a power cut.
+            # An object store never keeps incomplete uploads; a disk may have zeros after a power cut.
             if not self.folder.atomic_put and f"{zlib.crc32(self.folder.read(file) or b''):08x}" != crc32:
                 return None
         return ("done" if sidecar.get("job") == self.job.id else "kept"), ""
@@ -214,7 +214,7 @@ class _Worker:
         depth = prediction.depth
         outputs = {f"{name}{_ENDINGS[kind]}": _encoded(kind, prediction) for kind in self.job.save}
         if self.job.overwrite:
-            # A sidecar of before would vouch for the new depth, where the job ends before its own is written.
+            # If the job ended before the new sidecar is written, the old one would mark the new depth as its own.
             self.folder.remove(f"{name}.json")
         for file, data in outputs.items():
             self.folder.write(file, data)
@@ -248,7 +248,7 @@ def _encoded(kind: str, prediction: deepfusion.Prediction) -> bytes:
         return _depth_png(prediction.depth)
     array = prediction.depth if kind == "npy" else getattr(prediction, kind)
     if array is None:
-        raise ValueError(f"the network does not say how sure it is: save no {kind}")
+        raise ValueError(f"the network does not predict uncertainty: leave out {kind} from save")
     file = io.BytesIO()
     np.save(file, np.ascontiguousarray(array))
     return file.getvalue()
@@ -258,7 +258,7 @@ def _depth_png(depth: np.ndarray) -> bytes:
     """KITTI's format: 16-bit grey, in steps of 1/256 m, 0 where there is no depth."""
     from PIL import Image
 
-    # Half a step goes up, as in the program's own files.
+    # Half a step is rounded up, as in the program's own files.
     steps = np.clip(np.floor(depth.astype(np.float64) * 256 + 0.5), 1, 65535)
     file = io.BytesIO()
     Image.fromarray(np.where(depth > 0, steps, 0).astype(np.uint16)).save(file, "png")
@@ -270,7 +270,7 @@ def _check(model: str, precision: Precision, data_set: str | None, save: Sequenc
     precision."""
     opened = deepfusion.load(model, data_set=data_set)
     if precision == "int8":
-        # Whether it was calibrated is seen where the processor can.
+        # Checks the calibration, if this processor can compute in int8.
         try:
             deepfusion.load(model, precision=precision, data_set=data_set)
         except deepfusion.DeepFusionError as error:
@@ -280,10 +280,10 @@ def _check(model: str, precision: Precision, data_set: str | None, save: Sequenc
     camera = (64.0, 64.0, 31.5, 31.5)
     unsaid = [kind for kind in save if kind in ("sigma", "confidence")]
     if post_process is not None:
-        # A way of looking that the network cannot take.
+        # Raises for a test-time augmentation that the network does not support.
         opened.predict(grey, camera, post_process=post_process)
     if unsaid and opened.predict(grey, camera).sigma is None:
-        raise ValueError(f"save: the network does not say how sure it is, so that there is no {unsaid[0]} to save")
+        raise ValueError(f"save: the network does not predict uncertainty, so there is no {unsaid[0]} to save")
 
 
 def predict(
@@ -334,7 +334,7 @@ def predict(
         raise ValueError(f"gpus_per_worker: expected 0 or more, found {gpus_per_worker}")
     device = of_workers(device, gpus_per_worker)
     if gpus_per_worker and ":" in device:
-        raise ValueError(f"device: each worker is given a GPU of its own and sees that one alone, found {device}")
+        raise ValueError(f"device: expected no number, since each worker sees only the GPU it is given, found {device}")
     if precision != "f32" and (gpus_per_worker or device not in ("cpu", "auto")):
         raise ValueError(f"precision: a GPU computes in f32, found {precision}")
     if precision not in ("f32", "bf16", "int8"):

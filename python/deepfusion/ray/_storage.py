@@ -17,16 +17,16 @@ import fsspec
 
 import deepfusion
 
-# What is put there is there whole or not at all; a rename would be a copy.
+# Stores where an upload appears completely or not at all, and where a rename would be a copy.
 _OBJECT_STORES = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oss", "memory"}
 
 _IMAGES = {".png", ".jpg", ".jpeg"}
 
-# What a recording's reader looks for in the folder above it, or beside a video or a bag.
+# Files that a recording's reader looks for in the folder above it, or beside a video or a bag.
 _BESIDE = ["calib_*.txt", "dataset.toml", "bag.toml", "speed.csv", "imu.csv", "course.csv", "frames.csv", "timestamps.txt", "times.txt",
            "calibration.*", "camera.y*ml", "camchain.y*ml", "intrinsics.txt", "camera-intrinsics.txt"]  # fmt: skip
 
-# Logs and settings are smaller, other recordings mostly larger.
+# Logs and settings are smaller than this, other recordings mostly larger.
 _MOST_BESIDE = 64 << 20
 
 
@@ -81,7 +81,7 @@ class Folder:
         if parent not in self.made:
             self.fs.makedirs(parent, exist_ok=True)
             self.made.add(parent)
-        # Of this writer alone: two workers may be at the same image where one of them is thought dead.
+        # Unique to this writer: if Ray takes a living worker for dead, two may work on the same image.
         temporary = f"{path}.{uuid.uuid4().hex}.tmp"
         try:
             if is_local(self.fs):
@@ -129,7 +129,7 @@ class Sources:
                     here = os.path.join(folder, f"{i}{PurePosixPath(path).suffix}")
                     fs.get_file(path, here)
                     paths.append(here)
-                except Exception as error:  # Each file system has errors of its own; the other images are not to suffer by them.
+                except Exception as error:  # File systems raise their own errors, which must not affect the other images.
                     paths.append(error)
             yield paths
 
@@ -158,11 +158,11 @@ class Sources:
         path = path.rstrip("/")
         above, _, name = path.rpartition("/")
         with tempfile.TemporaryDirectory(prefix="deepfusion-") as folder:
-            # Below a folder of the same name: a KITTI drive's is the date.
+            # In a folder of the same name, which for a KITTI drive is the date.
             parent = os.path.join(folder, PurePosixPath(above).name)
             os.makedirs(parent, exist_ok=True)
             fs.get(path, os.path.join(parent, name), recursive=True)
-            # A list of buckets is no folder.
+            # Without a parent there is only the list of buckets, which is not a folder.
             for one in _files(fs, above) if above.strip("/") else []:
                 beside = PurePosixPath(one["name"])
                 belongs = beside.stem in (name, PurePosixPath(name).stem) or any(fnmatch(beside.name, shape) for shape in _BESIDE)
@@ -175,7 +175,7 @@ def _files(fs: Any, folder: str) -> list[dict[str, Any]]:
     """The files of a folder; none if it may not be listed, which a file that is known by name does not need."""
     if not _protocols(fs).isdisjoint({"http", "https"}):
         return []
-    # A listing may be of an earlier look, before somebody mended the recording.
+    # A cached listing may be older than a repair of the recording.
     fs.invalidate_cache()
     try:
         return [one for one in fs.ls(folder, detail=True) if one["type"] == "file"]
@@ -232,17 +232,17 @@ def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, 
         elif fs.exists(path):
             below, paths = path.rpartition("/")[0], [path]
         else:
-            raise FileNotFoundError(f"{url}: there is no such file or folder")
+            raise FileNotFoundError(f"{url}: no such file or folder")
         named_itself = paths == [path]
         taken = [one for one in paths if PurePosixPath(one).suffix.lower() in _IMAGES and (named_itself or not _is_output(fs, one))]
         if not taken:
-            raise FileNotFoundError(f"{url}: holds no image (.png, .jpg or .jpeg)")
+            raise FileNotFoundError(f"{url}: contains no image (.png, .jpg or .jpeg)")
         for one in taken:
             whole = one if is_local(fs) else fs.unstrip_protocol(one)
             found.setdefault(whole, one[len(below) :].lstrip("/"))
     named: list[tuple[str, str]] = []
     used: set[str] = set()
-    # In the order of their paths, so that the same inputs always get the same names.
+    # In order of paths, so that the same inputs always get the same names.
     for url, relative in sorted(found.items()):
         stem = str(PurePosixPath(relative).with_suffix(""))
         name, number = stem, 1

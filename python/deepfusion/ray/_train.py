@@ -61,17 +61,17 @@ def train(
     if backend not in ("gloo", "nccl"):
         raise ValueError(f'backend: expected "gloo" or "nccl", found {backend!r}')
     if backend == "nccl" and not use_gpu:
-        raise ValueError("backend: nccl adds on GPUs alone: use_gpu=True, or gloo")
+        raise ValueError("backend: nccl works only on GPUs: give use_gpu=True, or gloo")
     device = of_workers(device, int(use_gpu))
     if ":" in device:
-        raise ValueError(f"device: Ray says which GPU is whose: {device.partition(':')[0]!r}, found {device!r}")
+        raise ValueError(f"device: expected {device.partition(':')[0]!r}, since Ray assigns the GPUs, found {device!r}")
     if device != "cpu" and not use_gpu:
         raise ValueError(f"device: {device!r} needs use_gpu=True, which gives each worker a GPU")
     from ray.train import FailureConfig, RunConfig, ScalingConfig
     from ray.train.torch import TorchConfig, TorchTrainer
 
     folder = Path(out).absolute()
-    # Here rather than in the workers: it is one error, at once.
+    # Checked here, so that it is one immediate error and not one in each worker.
     if not (folder / _LAST).exists():
         _check_begun(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -116,7 +116,7 @@ def _learn(arguments: dict[str, Any]) -> None:
         if arguments["backend"] == "nccl":
             import torch
 
-            # Where `Torch` adds: each worker on a GPU of its own.
+            # The GPU on which `Torch` sums gradients: each worker's own.
             torch.cuda.set_device(gpu)
     del arguments["backend"]
     out = Path(arguments.pop("out"))
@@ -126,8 +126,8 @@ def _learn(arguments: dict[str, Any]) -> None:
     else:
         config, data = arguments.pop("config"), arguments.pop("data")
         if leads:
-            # Of a run that died before its first checkpoint nothing is lost. The best is written before the last: where it is there, it
-            # is of this job, which began without.
+            # A run that died before its first checkpoint has nothing to lose. The best checkpoint is written before the last one: if it exists, it
+            # belongs to this job, which started without any.
             _check_begun(out, _BEST)
             for file in list(out.iterdir()) if out.exists() else []:
                 if file.is_dir():
@@ -136,7 +136,7 @@ def _learn(arguments: dict[str, Any]) -> None:
                     file.unlink()
         run = deepfusion.train(config, data, out=out, workers=Torch(), device=device, **arguments)
     if leads:
-        # Ray keeps metrics only beside checkpoints of its own.
+        # Ray keeps metrics only with its own checkpoints.
         part = out / f"{_FIGURES}.part"
         part.write_text(json.dumps(dataclasses.asdict(run) | {"path": str(run.path)}))
         part.replace(out / _FIGURES)
@@ -152,7 +152,7 @@ def _check_begun(out: Path, *more: str) -> None:
         else:
             strange = None if file.name in more or _is_begun(file) else file
         if strange is not None:
-            error = deepfusion.DeepFusionError(f"{out}: is not empty, and {strange.relative_to(out)} is not of a run that has just begun")
+            error = deepfusion.DeepFusionError(f"{out}: is not empty, and {strange.relative_to(out)} does not belong to a run that has just started")
             error.hint = "choose another folder, or empty this one first"
             raise error
 
@@ -162,7 +162,7 @@ def _is_begun(file: Path) -> bool:
     if not _BEGUN.fullmatch(file.name):
         return False
     if file.name == "config.toml":
-        # Nobody sets what a run finds out.
+        # Only a run itself writes its findings.
         return "[findings" in file.read_text(errors="replace")
     return file.name != "log.csv" or file.read_text(errors="replace").startswith("step,split,")
 
@@ -175,5 +175,5 @@ def _own_gpu() -> int:
     own = get_device()
     if own.type == "cuda":
         return own.index or 0
-    # A torch without CUDA does not know; the workers of a machine are counted.
+    # A torch without CUDA does not know the GPUs; use the worker's number on its machine.
     return ray_train.get_context().get_local_rank()

@@ -143,7 +143,7 @@ def _learning(init: Any, validation: Any, camera: str | None, gpus: float, devic
         raise ValueError(f"gpus_per_trial: expected 0 or more, found {gpus}")
     device = of_workers(device, gpus)
     if gpus and ":" in device:
-        raise ValueError(f"device: each trial is given a GPU of its own: {device.partition(':')[0]!r}, found {device!r}")
+        raise ValueError(f"device: expected {device.partition(':')[0]!r}, since each trial is given its own GPU, found {device!r}")
     if not gpus and device != "cpu":
         raise ValueError(f"device: {device!r} needs gpus_per_trial, which gives each trial a GPU")
     return {
@@ -181,7 +181,7 @@ def _run(
             nonlocal best
             if event["event"] == "validated":
                 best = lower(best, event["selection"])
-                # A scheduler wants a number from the first report on.
+                # A scheduler needs a number from the first report on.
                 worst = math.inf if mode == "min" else -math.inf
                 figures = {"step": event["step"], "selection": worst if best is None else best, "path": str(out)}
                 if math.isfinite(event["scale_ratio"]):

@@ -29,7 +29,7 @@ pub(crate) struct EngineArgs {
 }
 
 impl EngineArgs {
-    /// What is chosen without a word, on a device.
+    /// The default engine on a device.
     pub(crate) fn on(device: ComputeDevice) -> Self {
         Self {
             engine: Engine::default(),
@@ -40,7 +40,7 @@ impl EngineArgs {
         }
     }
 
-    /// The same as the library takes it; which data set is meant is the network's matter.
+    /// The settings as the library takes them, without the data set, which belongs to the network.
     pub(crate) fn settings(&self) -> EngineSettings {
         EngineSettings {
             engine: self.engine,

@@ -27,7 +27,7 @@ impl LiveArgs {
         .find_map(|(given, name)| given.then_some(name))
     }
 
-    /// Seconds of silence that are borne.
+    /// Seconds of silence after which the source is given up.
     pub(crate) fn timeout_s(&self) -> f64 {
         self.timeout.unwrap_or(10.0)
     }

@@ -1,4 +1,4 @@
-//! The command line's shape: what can be said, not what it does.
+//! The command line's arguments; `commands` does the work.
 
 mod ablate;
 mod adapt;

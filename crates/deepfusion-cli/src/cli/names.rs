@@ -1,4 +1,4 @@
-//! The libraries' own enums on the command line: each value by its name, with a line for the help.
+//! The libraries' enums on the command line: each value has its name and a line of help.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use deepfusion_data::GtKind;
@@ -10,7 +10,7 @@ use deepfusion_model::{CheckpointKind, Learn, Preset, ViewMotion};
 use deepfusion_rosbag::Compression;
 use deepfusion_sim::{Scene, Sensors};
 
-/// A parser of these values by their names. Help lists each with its meaning, an error names them all.
+/// A parser of these values by name. The help lists each with its meaning; an error names them all.
 fn one_of<T: Copy + Send + Sync + 'static>(
     name: fn(T) -> &'static str,
     values: &'static [(T, &'static str)],
@@ -73,7 +73,7 @@ pub(super) fn preset() -> impl TypedValueParser<Value = Preset> {
     )
 }
 
-/// What a recording is learned from.
+/// What training uses of a recording.
 pub(super) fn learn() -> impl TypedValueParser<Value = Learn> {
     one_of(
         Learn::name,
@@ -149,7 +149,7 @@ pub(super) fn engine() -> impl TypedValueParser<Value = Engine> {
     )
 }
 
-/// In which numbers a network computes.
+/// The precision in which a network computes.
 pub(super) fn precision() -> impl TypedValueParser<Value = Precision> {
     one_of(
         Precision::name,
@@ -188,7 +188,7 @@ pub(super) fn gt_kind() -> impl TypedValueParser<Value = GtKind> {
     )
 }
 
-/// Of which predictions of an image its depth is the mean.
+/// Test-time augmentations: the predictions of an image whose mean is its depth.
 pub(super) fn post_process() -> impl TypedValueParser<Value = PostProcess> {
     one_of(
         PostProcess::name,
@@ -235,7 +235,7 @@ pub(super) fn compression() -> impl TypedValueParser<Value = Compression> {
     )
 }
 
-/// What the simulated car carries.
+/// Sensors of the simulated car.
 pub(super) fn sensors() -> impl TypedValueParser<Value = Sensors> {
     one_of(
         Sensors::name,
@@ -249,7 +249,7 @@ pub(super) fn sensors() -> impl TypedValueParser<Value = Sensors> {
     )
 }
 
-/// Places that a simulated drive leads through.
+/// Scenes of a simulated drive.
 pub(super) fn scene() -> impl TypedValueParser<Value = Scene> {
     one_of(
         Scene::name,
@@ -371,9 +371,10 @@ mod tests {
         values.map(|value| value.get_name().to_owned()).collect()
     }
 
-    /// What is added to the library is offered here, too: presets, outputs, scenes. Of those no drive leads through rooms.
+    /// Values that are added to the library are also offered here: presets, outputs, and all scenes except rooms, through which no drive
+    /// leads.
     #[test]
-    fn whatever_the_library_lists_is_offered() {
+    fn every_value_of_the_library_is_offered() {
         assert_eq!(names(&preset()), Preset::ALL.map(Preset::name));
         let roads = Scene::EVERY.into_iter().filter(|s| *s != Scene::Indoor);
         let roads: Vec<&str> = roads.map(Scene::name).collect();

@@ -63,7 +63,7 @@ impl PredictArgs {
         DepthOutputs::of(self.asked().iter().copied(), self.save.is_none(), limits)
     }
 
-    /// What `--save` says.
+    /// The outputs of `--save`.
     fn asked(&self) -> &[DepthOutput] {
         let default = &[DepthOutput::DepthPng, DepthOutput::Color];
         self.save.as_deref().unwrap_or(default)

@@ -84,7 +84,7 @@ pub(crate) struct PredictionArgs {
     pub engine: EngineArgs,
 }
 
-/// Whether a calibration is KITTI's, of a date: its recordings have it themselves, and it is of no others.
+/// Whether a calibration file is that of a KITTI date. Its recordings already have it, and it fits no others.
 fn is_kitti(path: &Path) -> bool {
     let file = path.file_name();
     path.is_dir() || file.is_some_and(|name| name == Calibration::CAM_TO_CAM)
@@ -102,7 +102,7 @@ impl PredictionArgs {
         }
     }
 
-    /// How the scale is watched.
+    /// Settings of the scale monitor.
     pub(crate) fn scale_config(&self) -> ScaleMonitorConfig {
         ScaleMonitorConfig {
             height_m: self.camera_height,

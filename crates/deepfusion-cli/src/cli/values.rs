@@ -1,4 +1,4 @@
-//! Values that are more than a word or a number.
+//! Values of options that are more than a word or a number.
 
 use std::str::FromStr;
 
@@ -16,7 +16,7 @@ pub(crate) struct Size {
     pub height: u32,
 }
 
-/// As a network's input.
+/// As the size of a network's input.
 impl From<Size> for InputSize {
     fn from(size: Size) -> Self {
         Self {
@@ -81,11 +81,11 @@ impl FromStr for CameraIntrinsics {
     }
 }
 
-/// That the camera is to be learned.
+/// The request to learn the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct LearnCamera;
 
-/// The one word that training takes for a camera.
+/// Parses `learn`, the only value that training takes for a camera.
 pub(super) fn learn_camera(text: &str) -> Result<LearnCamera, String> {
     if text == "learn" {
         return Ok(LearnCamera);
@@ -114,9 +114,9 @@ pub(super) fn scaling(text: &str) -> Result<Scaling, String> {
 /// How far the camera's clock is ahead of the vehicle's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ClockOffset {
-    /// So many seconds.
+    /// Given, in seconds.
     Seconds(f64),
-    /// As it is measured when the recordings are opened.
+    /// Measured when the recordings are opened.
     Auto,
 }
 

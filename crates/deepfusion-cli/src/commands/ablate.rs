@@ -93,7 +93,7 @@ fn request(args: &AblateArgs) -> Result<PlanRequest> {
     })
 }
 
-/// Where a key was set that the table decides: by which option it does.
+/// Names the option for a key that the table decides.
 fn in_options(error: deepfusion_jobs::Error) -> Failure {
     let deepfusion_jobs::Error::Model(ModelError::Setting { assignment, .. }) = &error else {
         return error.into();
@@ -102,17 +102,17 @@ fn in_options(error: deepfusion_jobs::Error) -> Failure {
         return error.into();
     };
     let reason = SettingProblem::DecidedElsewhere(match decides {
-        TableDecides::Length => "--budget says how long every run learns",
-        TableDecides::Seed => "--seeds says how often a row is run, and with which seeds",
-        TableDecides::Recordings => "the recordings are those of --data",
-        TableDecides::Cameras => "the cameras are those of --camera",
+        TableDecides::Length => "--budget sets how long every run is trained",
+        TableDecides::Seed => "--seeds sets how often a row is run, and with which seeds",
+        TableDecides::Recordings => "--data gives the recordings",
+        TableDecides::Cameras => "--camera chooses the cameras",
         other => other.reason(),
     });
     let assignment = assignment.clone();
     ModelError::Setting { assignment, reason }.into()
 }
 
-/// Trains and measures one run, or as much of it as is not done yet.
+/// Trains and evaluates one run, or continues it.
 fn made(run: OpenRun, plan: &Plan, out: &Path, device: ComputeDevice) -> Result<RunResult> {
     let mut trainer = run.trainer(
         &devices::open(device)?,

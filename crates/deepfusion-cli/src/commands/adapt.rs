@@ -1,4 +1,4 @@
-//! `deepfusion adapt`: learning on new drives, kept only if what can be known without ground truth gets no worse.
+//! `deepfusion adapt`: training on new drives, kept only if the metrics that need no ground truth get no worse.
 
 use std::path::Path;
 
@@ -45,7 +45,7 @@ pub(super) fn run(args: &AdaptArgs) -> Result<()> {
     }
     if adaptation.may_have_seen_held_out() {
         say(
-            "the given network may have learned from the frames that are held out here: the figures before may be optimistic",
+            "the given network may have been trained on the frames that are held out here: its metrics may be optimistic",
         );
     }
     let mut trainer = adaptation.trainer(
@@ -74,23 +74,25 @@ pub(super) fn run(args: &AdaptArgs) -> Result<()> {
     report(args, outcome)
 }
 
-/// A line about a camera that sees simulated streets.
+/// A line about a camera for which streets are simulated.
 fn own_camera(camera: &SimulatedCamera) -> String {
     let SimulatedCamera { width, height, .. } = camera;
     let above = match camera.height_m {
-        Some(metres) => format!("{metres:.2} m above the road, by the road's motion in the images"),
+        Some(metres) => format!(
+            "{metres:.2} m above the road, as measured from the road's motion in the images"
+        ),
         None => {
-            "at any height that cars have it, as the images do not show the road's motion".into()
+            "at any height usual on cars, since the images do not show the road's motion".into()
         }
     };
     format!(
-        "simulated streets are seen by this camera ({width}x{height}, fx {:.0}), {above}",
+        "streets are simulated for this camera ({width}x{height}, fx {:.0}), {above}",
         camera.fx
     )
 }
 
 fn judging() -> Progress {
-    Progress::new("judging without ground truth")
+    Progress::new("evaluating without ground truth")
 }
 
 fn estimator(args: &AdaptArgs, model: &ModelSource, set: Option<&str>) -> Result<DepthEstimator> {
@@ -99,7 +101,7 @@ fn estimator(args: &AdaptArgs, model: &ModelSource, set: Option<&str>) -> Result
     engine::load(model, &engine)
 }
 
-/// What the options say.
+/// The settings that the options give.
 fn settings(args: &AdaptArgs, out: &Path, given: &DepthEstimator) -> Result<AdaptSettings> {
     let mut settings = AdaptSettings {
         camera: args.camera,
@@ -121,7 +123,7 @@ fn settings(args: &AdaptArgs, out: &Path, given: &DepthEstimator) -> Result<Adap
     Ok(settings)
 }
 
-/// Prints what it came to; what is not kept is an error.
+/// Prints the outcome; a network that is not kept is an error.
 fn report(args: &AdaptArgs, outcome: Outcome) -> Result<()> {
     if args.json {
         output::print_json(&outcome)?;

@@ -1,4 +1,4 @@
-//! `deepfusion bench`: what a network costs, and how fast every stage around it is.
+//! `deepfusion bench`: the cost of a network, and the speed of every stage around it.
 
 use deepfusion_jobs::bench::BenchRequest;
 use deepfusion_model::weights::Weights;
@@ -22,7 +22,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
     };
     let report = request.measure(&mut *runner)?;
     if args.profile && report.profile_ms.is_empty() {
-        tracing::warn!("only the fused engine can time its steps");
+        tracing::warn!("--profile: only the fused engine can time its steps");
     }
     if args.json {
         return output::print_json(&report);
@@ -35,7 +35,7 @@ fn network(args: &BenchArgs) -> Result<(String, TrainConfig, Box<dyn DepthRunner
     let model = match (&args.model, args.preset, args.size) {
         (Some(model), ..) => Some(model::named(model)?),
         (None, None, None) => model::embedded_default()?,
-        // The size is a preset's.
+        // `--preset` or `--size`: not the embedded network.
         (None, ..) => None,
     };
     if let Some(model) = model {

@@ -1,4 +1,4 @@
-//! `deepfusion calibrate`: a camera from pictures of a checkerboard.
+//! `deepfusion calibrate`: a camera's intrinsics and lens from images of a checkerboard.
 
 use deepfusion_calibrate::Board;
 use deepfusion_hint::count_of;
@@ -53,7 +53,7 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
     }
     output::print(&report.to_string())?;
     say(&format!(
-        "use it: deepfusion predict --calib {} IMAGES --out DIR, or as calibration.yaml in a drive's folder",
+        "use it with deepfusion predict --calib {} IMAGES --out DIR, or as calibration.yaml in a drive's folder",
         args.out.display()
     ));
     Ok(())

@@ -13,7 +13,7 @@ use crate::cli::ClockOffset;
 use crate::failure::Result;
 use crate::progress::say;
 
-/// What `--clock-offset` says.
+/// The value of `--clock-offset`, as a request to the library.
 #[cfg(feature = "train")]
 pub(super) fn ahead(offset: ClockOffset) -> ClockAhead {
     match offset {
@@ -22,7 +22,7 @@ pub(super) fn ahead(offset: ClockOffset) -> ClockAhead {
     }
 }
 
-/// How far the camera's clock is said or measured to be ahead, in seconds; `None` where nothing is asked.
+/// How far the camera's clock is ahead, in seconds, as given or measured; `None` without the option.
 pub(super) fn seconds(
     asked: Option<ClockOffset>,
     paths: &[PathBuf],
@@ -52,23 +52,23 @@ pub(super) fn seconds_of(
     seconds(asked, &[path.to_owned()], options)
 }
 
-/// How far a clock is from another, in milliseconds, and to which side.
+/// How far one clock is from another, in milliseconds, and in which direction.
 fn apart(ahead_ms: f64, error_ms: f64) -> String {
     let side = if ahead_ms < 0.0 { "behind" } else { "ahead of" };
     format!("{:.0} ± {error_ms:.0} ms {side}", ahead_ms.abs())
 }
 
-/// Measures the offset of open recordings, and says it.
+/// Measures the offset of open recordings, and prints it.
 pub(super) fn measured<'a>(datasets: impl IntoIterator<Item = &'a Dataset>) -> Result<f64> {
     let common = common_camera_ahead(datasets)?;
     for why in &common.unmeasured {
-        warnings::warn_once(format!("{why}; it gets what the other recordings show"));
+        warnings::warn_once(format!("{why}; using the offset of the other recordings"));
     }
     let found = common.ahead;
     let (ahead_ms, error_ms) = (1e3 * found.ahead_s, 1e3 * found.std_error_s);
     say(&format!(
-        "the camera's clock is {} the vehicle's by how the pictures turn (correlation {:.2}); --clock-offset {ahead_ms:.0} says so without \
-         measuring",
+        "the camera's clock is {} the vehicle's, as measured from the turns in the images (correlation {:.2}); --clock-offset {ahead_ms:.0} sets \
+         it without measuring",
         apart(ahead_ms, error_ms),
         found.correlation
     ));

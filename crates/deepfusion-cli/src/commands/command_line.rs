@@ -1,6 +1,6 @@
 //! The command that is running, for the pages that it makes.
 
-/// As it could be typed again.
+/// The command as it could be typed again.
 pub(super) fn typed_again() -> String {
     let quoted = |word: String| {
         let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@".contains(c);

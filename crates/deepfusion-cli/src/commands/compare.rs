@@ -52,7 +52,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     }
 }
 
-/// The file of the pictures, where there are any: that of the tables with the ending of a PNG.
+/// The file for the pictures, if there are any: the name of the tables' file with the ending `png`.
 fn pictures_beside(args: &CompareArgs) -> Result<Option<PathBuf>> {
     let (Some(_), Some(out)) = (&args.pictures, &args.out) else {
         return Ok(None);
@@ -71,7 +71,7 @@ fn html(args: &CompareArgs, tables: &Tables, rows: &[Vec<Tile>]) -> Result<Strin
     Ok(comparison_page(&args.runs, tables, pictures, &command)?.to_html())
 }
 
-/// The same images by each model: a row an image, a column a model, with the scans where there are any.
+/// The same images predicted by each model: one row per image and one column per model, with the scans if there are any.
 fn pictures(args: &CompareArgs, recording: &Path) -> Result<Vec<Vec<Tile>>> {
     if let Some(file) = args.runs.iter().find(|p| !p.is_dir()) {
         return Err(CliError::NoModel { path: file.clone() }.into());

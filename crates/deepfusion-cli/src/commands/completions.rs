@@ -1,4 +1,4 @@
-//! `deepfusion completions`: what shells and `man` want to know of the command line.
+//! `deepfusion completions`: completion scripts for shells, and pages for `man`.
 
 use std::path::Path;
 
@@ -20,12 +20,12 @@ pub(super) fn run(args: &CompletionsArgs) -> Result<()> {
         CompletionsKind::Powershell => Shell::PowerShell,
         CompletionsKind::Zsh => Shell::Zsh,
         CompletionsKind::Man => {
-            // Required by the command line.
+            // `--out` is required with `man`.
             return args.out.as_deref().map_or(Ok(()), manual);
         }
     };
     if args.out.is_some() {
-        let message = "--out is for pages of the manual; a shell's script goes to stdout";
+        let message = "--out is only for the manual's pages; a shell's script is printed on stdout";
         Cli::command()
             .error(ErrorKind::ArgumentConflict, message)
             .exit();

@@ -1,4 +1,4 @@
-//! `deepfusion config`: what can be configured.
+//! `deepfusion config`: every key of the configuration.
 
 use crate::cli::{ConfigSource, ShowArgs};
 use crate::failure::Result;

@@ -26,7 +26,7 @@ struct Made<'a> {
 pub(super) fn run(args: &ConvertArgs) -> Result<()> {
     warnings::warn_of_hfov(args.hfov);
     let ends_in = |ending: &str| has_ending(&args.out, ending);
-    // It would become a folder of that name, and nobody who names a bag wants one.
+    // Otherwise a folder of that name would be made, which is not what the user meant.
     if ends_in("mcap") || ends_in("db3") {
         let path = args.out.clone();
         return Err(CliError::NoRos2Writer { path }.into());
@@ -46,8 +46,8 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
         let input = args.input.clone();
         return Err(CliError::SeveralDrives { input, drives }.into());
     }
-    // A video is decoded at its first frame, by a program that Ctrl-C ends, too: until then a signal ends this one at once. Where something is
-    // in the way, that is said without decoding first.
+    // Loading the first frame decodes its video, with a program that Ctrl-C ends as well. So signals are caught only afterwards: until then they
+    // end this program at once. If something exists at the output's path, that is reported without decoding first.
     if matches!(deepfusion_fs::in_the_way(&args.out), Ok(None)) {
         for dataset in datasets.iter().filter(|d| !d.frames().is_empty()) {
             dataset.load_image(0)?;
@@ -70,7 +70,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
     let Converted { paths, moved_s } = written;
     if moved_s > 0 {
         tracing::warn!(
-            "{}: some of its times are not after the beginning of 1970, which neither layout can write: all are written \
+            "{}: some times are before 1970, which neither layout can represent: all times are written \
              {moved_s} s later",
             args.input.display()
         );
@@ -95,7 +95,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
     found.is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
-/// Warns of what the recording lacks and was therefore not written.
+/// Warns about times and speeds that the recording lacks and that were therefore not written.
 fn warn_of_missing(dataset: &Dataset) {
     let timed = dataset.frames().iter().any(|f| f.time_s.is_some());
     let missing = match (timed, dataset.track().is_some()) {
@@ -105,7 +105,7 @@ fn warn_of_missing(dataset: &Dataset) {
         (false, false) => "no times and no speeds",
     };
     warnings::warn_once(format!(
-        "{}: {missing}, so none were written: evaluate and predict on it, training needs both",
+        "{}: {missing}, so none were written: it can be used to evaluate and predict, but training needs both",
         dataset.name()
     ));
 }

@@ -40,7 +40,7 @@ pub(super) fn run(args: &EvalOdometryArgs) -> Result<()> {
     }
 }
 
-/// The pose network's motions between consecutive frames, chained, beside the drives' true paths.
+/// The pose network's motions between consecutive frames, chained, with the drives' true paths.
 fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     allocator::keep_memory();
     let model = args.model.as_deref().unwrap_or(Path::new("."));
@@ -58,7 +58,7 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     };
     options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
     let datasets = open_aimed(&args.data, &options)?;
-    let mut progress = Progress::new("following");
+    let mut progress = Progress::new("predicting motion");
     let mut warn = |warning: OdometryWarning| tracing::warn!("{warning}");
     let found = tracks(&predictor, &datasets, &mut warn, &mut |done, total| {
         progress.set(done, total);

@@ -25,7 +25,7 @@ pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
         Some(out) => Some(output::run_folder(Some(out), "eval-targets")?),
         None => None,
     };
-    // The image with the targets on it, where it was asked for.
+    // Saves the image with the targets drawn on it, if `--out` is given.
     let save = |frame: &EvaluatedFrame| -> Result<()> {
         if let Some(out) = &out {
             let picture = box_overlay(&(frame.image)()?, &frame.camera, frame.targets);
@@ -71,7 +71,7 @@ fn source(args: &EvalTargetsArgs) -> Result<DepthSource> {
             }))
         }
         (Some(TargetDepth::Lidar), _) => DepthSource::Lidar,
-        // One of the two is asked for by the command line.
+        // The command line requires one of the two.
         (Some(TargetDepth::Truth), _) | (None, None) => DepthSource::Truth,
     })
 }

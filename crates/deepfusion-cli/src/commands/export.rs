@@ -18,7 +18,7 @@ struct Report {
     depth_min_m: f64,
     depth_max_m: f64,
     training_fy_px: Option<f64>,
-    /// For networks of many cameras: depth of every camera is to be multiplied by its f_y over this.
+    /// For networks of many cameras: each camera's depth must be multiplied by its f_y divided by this.
     canonical_fy_px: Option<f64>,
     pictures: [&'static str; 4],
     checks: Vec<CheckReport>,
@@ -60,14 +60,14 @@ pub(super) fn run(args: &ExportArgs) -> Result<()> {
     }
     if let Some(focal) = report.canonical_fy_px {
         say(&format!(
-            "the network learned many cameras, and its depth is that of one with a focal length of {focal} pixels: multiply it by f_y / {focal}, \
-             with your camera's vertical focal length f_y in pixels of the picture as it is resized to {}x{}",
+            "the network was trained on many cameras, and its depth is for one with a focal length of {focal} pixels: multiply it by f_y / {focal}, \
+             where f_y is your camera's vertical focal length in pixels of the image resized to {}x{}",
             model.width, model.height
         ));
     }
     for check in &report.checks {
         say(&format!(
-            "checked with {}: depth {:.1e}, disparity {:.1e} from the network (max |difference| / max |value|, {} pictures)",
+            "checked with {}: depth differs by {:.1e}, disparity by {:.1e} from the network (max |difference| / max |value|, {} pictures)",
             check.engine,
             check.depth_deviation,
             check.disparity_deviation,

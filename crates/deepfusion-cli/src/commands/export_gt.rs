@@ -18,7 +18,7 @@ use crate::progress::{Progress, say};
 struct Made<'a> {
     file: &'a Path,
     frames: usize,
-    /// Frames of the split, where one was given.
+    /// Number of the split's frames, if a split was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     expected: Option<usize>,
 }
@@ -37,7 +37,7 @@ pub(super) fn run(args: &ExportGtArgs) -> Result<()> {
     let expected = expected_frames(&options, &datasets, args.strict)?;
     let kind = args.gt_depth;
     if args.strict {
-        // Known before the file is written: a part of what was asked for would be taken for all of it.
+        // Checked before the file is written: a part of the frames must not be mistaken for all of them.
         let with_truth = |d: &Dataset| {
             d.selected()
                 .iter()

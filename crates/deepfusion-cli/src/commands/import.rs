@@ -39,7 +39,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
         unit: args.unit,
         dbc: args.dbc.clone(),
     };
-    // clap asks for one log at least.
+    // clap requires at least one log.
     let read = read_all(&args.logs, &options, args.zone)?;
     let (log, own_clock) = read.ok_or(CliError::NoMedia)?;
     let start_ns = match &args.start {
@@ -134,7 +134,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
     Ok(())
 }
 
-/// How to give the camera of a folder that was written, where nothing says it.
+/// How to give the camera of a folder that was written without one.
 fn missing_camera(out: &Path) -> Option<String> {
     use deepfusion_data::Error;
     match Dataset::open(out, &OpenOptions::default()) {
@@ -144,12 +144,12 @@ fn missing_camera(out: &Path) -> Option<String> {
                 None => error.to_string(),
             })
         }
-        // What else is wrong is not the camera's, and said when it is looked at.
+        // Other errors are not about the camera, and are reported when the recording is opened.
         _ => None,
     }
 }
 
-/// Writes the folder with the offset of the clocks that its pictures show. Ctrl-C leaves nothing that looks finished.
+/// Writes the folder with the clock offset measured from its images. Ctrl-C leaves nothing that looks finished.
 fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<LogNote>> {
     folder.check(out)?;
     interrupt::catch("stopping once the clocks are compared; nothing is written");
@@ -160,7 +160,8 @@ fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<LogNot
     })
 }
 
-/// A camera's own log counts from the first frame of its video: of another one, were it the same cut, nobody knows when it began.
+/// Refuses a video other than the log's own: such a log counts from the first frame of its video, and when another one began, even a cut
+/// of the same, is unknown.
 fn of_its_own_video(args: &ImportArgs) -> Result<()> {
     let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
     match (&args.video, args.logs.first()) {

@@ -26,7 +26,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
     let inspection = inspect(&args.path, &options)?;
     if let Some(first) = inspection.unreadable.first() {
         print(&inspection, args.json)?;
-        // Nothing is written of a part.
+        // If some recordings are unreadable, nothing is written for the others.
         return Err(CliError::Unreadable {
             path: args.path.clone(),
             unreadable: inspection.unreadable.len(),
@@ -35,7 +35,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
         }
         .into());
     }
-    // First of all, since it may be refused: what is printed then stands as it was read.
+    // Before printing, since writing may be refused.
     let written = if args.write_config {
         write_config(args, &options)?
     } else {
@@ -64,7 +64,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
     Ok(())
 }
 
-/// The camera of the images, where there are any.
+/// The camera of the images, if there are any.
 fn camera(inspection: &Inspection) -> Option<Intrinsics> {
     let (k, [width, height]) = inspection.intrinsics.zip(inspection.size)?;
     let numbers = [k.fx, k.fy, k.cx, k.cy];
@@ -79,13 +79,13 @@ fn print(inspection: &Inspection, json: bool) -> Result<()> {
     }
 }
 
-/// The files beside the bags, written.
+/// Writes the files beside the bags and returns their paths.
 fn write_config(args: &InspectArgs, options: &OpenOptions) -> Result<Vec<PathBuf>> {
     use deepfusion_data::Error;
     write_bag_config(&args.path, options, args.overwrite).map_err(|error| match error {
         Error::Exists { path } => CliError::Exists {
             path,
-            hint: "it is this bag's already; --overwrite rewrites it and keeps its keys",
+            hint: "edit it, or rewrite it with --overwrite, which keeps its keys",
         }
         .into(),
         other => other.into(),

@@ -1,4 +1,4 @@
-//! What `predict` and `perceive` do alike with a camera or a stream.
+//! What `predict` and `perceive` share for a camera or a stream.
 
 use std::io::IsTerminal;
 
@@ -11,7 +11,7 @@ use crate::error::CliError;
 use crate::failure::Result;
 use crate::interrupt;
 
-/// The live source among the arguments, if they name one; it is then alone, and options of live sources are for it.
+/// The live source among the inputs, if there is one. It must be the only input; options of live sources are refused without one.
 pub(super) fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Address>> {
     let mut found = inputs.iter().filter_map(|input| Address::parse(input));
     match (found.next(), args.given()) {
@@ -31,8 +31,8 @@ pub(super) fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Addres
     }
 }
 
-/// Begins to read a source, until Ctrl-C or what the options say. A camera is asked for images of its calibration's size, unless its address asks
-/// for others: a driver's own choice is often the smallest.
+/// Starts reading a source, until Ctrl-C or the limits of the options. A camera is asked for images of its calibration's size, unless its
+/// address asks for another: the driver's default is often the smallest.
 pub(super) fn open(
     address: &Address,
     camera: &CameraSource,
@@ -51,11 +51,11 @@ pub(super) fn open(
     Ok(Feed::open(&address, &until)?)
 }
 
-/// Warns where a source's end may be a loss.
+/// Warns if a source's end may be a lost connection.
 pub(super) fn warn_of_end(address: &Address, ending: &Result<LiveEnd>) {
     if matches!(ending, Ok(LiveEnd::Closed)) {
         tracing::warn!(
-            "{address}: the other side closed the stream: whether it was over or is lost cannot be seen"
+            "{address}: the other side closed the stream; it may have ended or been lost"
         );
     }
 }

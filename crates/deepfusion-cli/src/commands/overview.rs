@@ -33,14 +33,14 @@ show, completions.
 Every command has its own help: deepfusion train --help
 ";
 
-/// `deepfusion` alone: what it can do, with examples to copy.
+/// `deepfusion` without arguments: what it can do, with examples to copy.
 pub(super) fn run() -> Result<()> {
     output::print(OVERVIEW)?;
     if cfg!(feature = "train") {
         Ok(())
     } else {
         output::print(
-            "\nThis build has no training: demo, train, adapt, ablate, eval-odometry, export and weights import are left out.\n",
+            "\nThis build cannot train: it has no demo, train, adapt, ablate, eval-odometry, export and weights import.\n",
         )
     }
 }

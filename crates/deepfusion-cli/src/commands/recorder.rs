@@ -1,4 +1,4 @@
-//! What becomes of a trainer's events: log files, panels, and lines for the person who waits.
+//! Turns a trainer's events into log files, panels and lines on stderr.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ use crate::failure::{Failure, Result};
 use crate::interrupt;
 use crate::progress::{Progress, duration_text, say};
 
-/// How often a line has the losses where there is no bar.
+/// Time between two lines with the losses, if there is no bar.
 const LINE_EVERY: Duration = Duration::from_secs(20);
 
 /// Writes the logs of a run and shows its progress.
@@ -19,14 +19,14 @@ pub(super) struct Recorder {
     log: RunLog,
     progress: Progress,
     last_line: Instant,
-    /// Where it is to be said how long the run will take.
+    /// Present if the time that the run will take is to be printed.
     pace: Option<Pace>,
-    /// The first failure to write a log: training goes on, the command ends with it.
+    /// The first failure to write a log, which stops training and is the command's error.
     failure: Option<Failure>,
 }
 
 impl Recorder {
-    /// For the run in `folder`, going on after `step`; with a `pace` it says how long the run will take.
+    /// For the run in `folder`, continuing after `step`; with a `pace`, prints how long the run will take.
     pub(super) fn open(folder: &Path, step: usize, pace: Option<Pace>) -> Result<Self> {
         Ok(Self {
             log: RunLog::open(folder, step)?,
@@ -40,7 +40,7 @@ impl Recorder {
     /// Handles an event.
     pub(super) fn handle(&mut self, event: TrainEvent) -> Control {
         if let Err(error) = self.log.write(&event) {
-            // A full disk: what is saved is safe, more would be lost.
+            // The disk may be full: saved checkpoints are safe, further steps could be lost.
             self.failure.get_or_insert(error.into());
             return Control::Stop;
         }
@@ -86,7 +86,7 @@ impl Recorder {
     }
 }
 
-/// How long a run will take, and the options that choose otherwise.
+/// How long a run will take, and the options that change it.
 fn how_long(estimate: &TimeEstimate) -> String {
     let pace = match estimate.step_s {
         s if s < 10.0 => format!("{s:.2} s"),
@@ -107,7 +107,7 @@ fn how_long(estimate: &TimeEstimate) -> String {
     let choices: Vec<String> = choices.collect();
     if !choices.is_empty() {
         line.push_str(&format!(
-            "; as many with {} (by their multiply-adds)",
+            "; the same number with {} (estimated from multiply-adds)",
             choices.join(", ")
         ));
     }
@@ -124,7 +124,7 @@ mod tests {
     use deepfusion_model::{InputSize, Preset};
 
     #[test]
-    fn the_line_names_the_options_that_choose_otherwise() {
+    fn the_line_names_the_options_that_change_it() {
         let mut estimate = TimeEstimate {
             steps: 1200,
             step_s: 1.0,
@@ -142,8 +142,8 @@ mod tests {
         };
         assert_eq!(
             how_long(&estimate),
-            "about 20:00 min from here: 1200 steps of 1.00 s; as many with --size 640x192 about 1 h 20 min, --preset tiny about \
-             5:00 min (by their multiply-adds); --steps N changes the length"
+            "about 20:00 min from here: 1200 steps of 1.00 s; the same number with --size 640x192 about 1 h 20 min, --preset tiny about \
+             5:00 min (estimated from multiply-adds); --steps N changes the length"
         );
         (estimate.bf16, estimate.step_s) = (true, 12.4);
         estimate.choices.clear();

@@ -15,7 +15,7 @@ use deepfusion_train::SampleSet;
 
 use super::warnings;
 
-/// Opens the recordings at several paths, each drive and camera a data set.
+/// Opens the recordings at several paths, each drive and camera as a [`Dataset`].
 pub(super) fn open_datasets(
     paths: &[PathBuf],
     split: Option<&Path>,
@@ -29,42 +29,42 @@ pub(super) fn open_datasets(
     open_recordings(paths, &options)
 }
 
-/// As [`open_datasets`], as the options say.
+/// As [`open_datasets`], with the given options.
 pub(super) fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let datasets = recordings::open_recordings(paths, options)?;
     print_warnings(options, &datasets);
     Ok(datasets)
 }
 
-/// As [`open_recordings`], for what takes the vehicle's motion: where no mount is given, the one that the images show.
+/// As [`open_recordings`], for commands that need the vehicle's motion: if no camera mount is given, it is measured from the images.
 pub(super) fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let datasets = recordings::open_aimed(paths, options)?;
     print_warnings(options, &datasets);
     Ok(datasets)
 }
 
-/// As [`open_aimed`], for what measures by the vehicle's turns: without a yaw rate those that the images show.
+/// As [`open_aimed`], for commands that need the vehicle's turns: without a yaw rate, turns are measured from the images.
 pub(super) fn open_with_yaw(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let datasets = recordings::open_with_yaw(paths, options)?;
     print_warnings(options, &datasets);
     Ok(datasets)
 }
 
-/// The training and validation samples of a configuration; warns of drives that are skipped, of speeds that cannot be m/s and of
-/// validation frames that are seen in training.
+/// The training and validation samples of a configuration. Warns of skipped drives, speeds that cannot be in m/s and validation
+/// frames that are also used in training.
 #[cfg(feature = "train")]
 pub(super) fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
     let samples = samples::open_samples(config, &mut print_warnings, &mut warn_of_sample);
     Ok(samples?)
 }
 
-/// Prints what may not be meant of the samples.
+/// Prints a warning about the samples.
 #[cfg(feature = "train")]
 pub(super) fn warn_of_sample(warning: SampleWarning) {
     warnings::warn_once(warning.to_string());
 }
 
-/// Their warnings, and that frames of the split are missing.
+/// Prints the recordings' warnings, and one if frames of the split are missing.
 pub(super) fn print_warnings(options: &OpenOptions, datasets: &[Dataset]) {
     warnings::print(datasets);
     if let Some(missing) = missing_frames(options, datasets) {

@@ -1,4 +1,4 @@
-//! The options of `train --resume` as what they ask of the run ([`resume`]).
+//! The options of `train --resume` as a request to the library ([`resume`]).
 
 use std::path::Path;
 
@@ -10,13 +10,13 @@ use crate::cli::TrainArgs;
 use crate::error::CliError;
 use crate::failure::{Failure, Result, option_of};
 
-/// A run's configuration with what was asked for.
+/// A run's configuration, changed as the options ask.
 pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> {
     Ok(resume::go_on_with(run, &request(args)?)?)
 }
 
 fn request(args: &TrainArgs) -> Result<ResumeRequest> {
-    // Every option by name: one that is added says here what becomes of it.
+    // Every option by name, so that a new one must be handled here.
     let TrainArgs {
         data,
         preset,
@@ -79,13 +79,13 @@ fn request(args: &TrainArgs) -> Result<ResumeRequest> {
     })
 }
 
-/// Where an error is that one of the run's recordings is not there, one whose hint is the option that says where it is now.
+/// If the error is that one of the run's recordings is missing, an error whose hint names the option for its new path.
 pub(super) fn where_recordings_are(error: Failure, config: &TrainConfig, run: &Path) -> Failure {
     let Some(path) = error.missing().map(Path::to_owned) else {
         return error;
     };
     let option = match resume::setting_of(&path, config) {
-        // It stands in the run's configuration alone.
+        // Only the run's configuration names it.
         Some(Setting::DataSet) => None,
         Some(setting) => Some(option_of(&setting)),
         None => return error,
@@ -134,7 +134,7 @@ mod tests {
         let other = written("other.toml", &|c| c.learning_rate = 0.5);
         let run = a_run();
         let with = |options: &[&str]| with_options(&run, &asked(options));
-        // What it has already is no contradiction, and what can apply is used.
+        // A value that the run already has is no contradiction, and an option that can apply is used.
         assert_eq!(with(&[]).unwrap(), run);
         type Change = fn(&mut TrainConfig);
         let used: [(&[&str], Change); 18] = [
@@ -205,7 +205,7 @@ mod tests {
                 assert!(error.contains(part), "{options:?}: no `{part}` in {error}");
             }
         }
-        // An option that is added has its place in one of the tables.
+        // A new option must be in one of the tables.
         let tested: Vec<&str> = used
             .iter()
             .map(|(o, _)| o[0])
@@ -216,13 +216,13 @@ mod tests {
             let option = format!("--{long}");
             let known = ["--out", "--resume"].contains(&option.as_str())
                 || tested.contains(&option.as_str());
-            assert!(known, "{option}: what becomes of it with --resume?");
+            assert!(known, "{option}: not tested with --resume");
         }
     }
 
-    /// A name is compared as it is, whatever folder the command is given in.
+    /// A name is compared as text, independent of the current folder.
     #[test]
-    fn the_embedded_network_that_a_run_began_from_is_no_contradiction() {
+    fn the_embedded_network_that_a_run_started_from_is_no_contradiction() {
         let mut run = a_run();
         (run.init, run.init_sha256) = (Some("street".into()), Some("ab".repeat(32)));
         assert_eq!(
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_run_has_may_have_moved() {
+    fn recordings_of_a_run_may_have_moved() {
         let mut run = a_run();
         run.data.validation = vec!["/data/val".into()];
         run.data.split = Some("/data/split.txt".into());
@@ -257,7 +257,7 @@ mod tests {
         let moved = with_options(&run, &asked(&options)).unwrap();
         assert_eq!(moved.data.validation, [PathBuf::from("/v")]);
         assert_eq!(moved.data.split, Some("/s.txt".into()));
-        // Data sets have places of their own, in the file.
+        // The paths of data sets are in the file.
         run.data = toml::from_str("sets = [{ name = 'road', paths = ['/road'] }]").unwrap();
         for options in [
             ["--data", "/d"],
@@ -290,7 +290,7 @@ mod tests {
         );
         assert!(hint.contains("--data PATH"), "{hint}");
         assert!(explained("/data/val/x").1.contains("--val-data PATH"));
-        // A data set's own is named in the run's configuration alone.
+        // Only the run's configuration names the recordings of a data set.
         let with_sets = TrainConfig {
             data: toml::from_str("sets = [{ name = 'road', paths = ['/road'] }]").unwrap(),
             ..a_run()
@@ -300,7 +300,7 @@ mod tests {
         let error = where_recordings_are(error.into(), &with_sets, Path::new("runs/a"));
         let hint = error.hint().unwrap_or_default();
         assert!(hint.contains("config.toml"), "{hint}");
-        // Another file is another matter.
+        // Other files are not the run's.
         assert!(!explained("/etc/x").0.contains("runs/a"));
     }
 }

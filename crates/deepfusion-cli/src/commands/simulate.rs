@@ -75,7 +75,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<()> {
     output::print(&format!("{}\n", drive.display()))
 }
 
-/// That no option is given that would be silently without effect.
+/// Refuses options that would silently have no effect.
 ///
 /// # Errors
 /// [`CliError::OtherLayout`].
@@ -89,7 +89,7 @@ fn check_layout(args: &SimulateArgs) -> Result<(), CliError> {
             ("--compression", "a KITTI drive is a folder of files")
         }
         args if is_bag && args.scan_every.is_some() => {
-            ("--scan-every", "a bag's LiDAR has a rate of its own")
+            ("--scan-every", "a bag's LiDAR has its own rate")
         }
         _ => return Ok(()),
     };
@@ -101,8 +101,8 @@ fn check_layout(args: &SimulateArgs) -> Result<(), CliError> {
     })
 }
 
-/// That nothing is asked for which a varied drive draws or has no room for, nor a place that only varied drives lead to. The library refuses
-/// the same, but sees no difference between a height that is given and the usual one.
+/// Refuses options that a varied drive draws or cannot have, and scenes that only varied drives have. The library refuses the same, but
+/// cannot distinguish a given height from the default.
 ///
 /// # Errors
 /// [`CliError::Varied`].
@@ -125,11 +125,11 @@ fn check_varied(args: &SimulateArgs) -> Result<(), CliError> {
     Err(CliError::Varied { given, why })
 }
 
-/// What to say where fewer cars drive than were asked for.
+/// The warning if fewer cars drive than were asked for.
 fn fewer_cars(asked: usize, driving: usize) -> Option<String> {
     let drive = if driving == 1 { "drives" } else { "drive" };
     (driving < asked).then(|| {
-        format!("--moving-cars {asked}: only {driving} {drive}, the others would drive into something that stands on this street")
+        format!("--moving-cars {asked}: only {driving} {drive}; the others would hit something that stands on this street")
     })
 }
 
@@ -152,7 +152,7 @@ fn in_a_line(drawn: &DrawnDrive) -> String {
     )
 }
 
-/// What to simulate; what is not said follows the layout's data set.
+/// What to simulate. Defaults follow the data set whose layout is written.
 fn config(args: &SimulateArgs) -> SimConfig {
     let (sensors, size, fps) = match args.format {
         SimulateFormat::Kitti => (Sensors::Kitti, (640, 192), 10.0),
@@ -185,7 +185,7 @@ mod tests {
     use super::fewer_cars;
 
     #[test]
-    fn a_street_with_room_for_fewer_cars_is_warned_of() {
+    fn a_street_with_room_for_fewer_cars_gives_a_warning() {
         let warning = fewer_cars(6, 1).unwrap();
         assert!(warning.starts_with("--moving-cars 6: only 1 drives"));
         assert_eq!(fewer_cars(6, 6), None);

@@ -48,14 +48,14 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
     output::print(&format!("{}\n", trainer.folder().display()))
 }
 
-/// A new run. What is wrong with its start or its folder is said before the recordings are looked at, which may take long.
+/// A new run. Errors of its start or its folder are reported before the recordings are opened, which may take long.
 fn begun(args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
     if let Some(out) = &args.out {
         output::require_run_folder(out)?;
     }
     let mut config = request(args)?.config(|datasets| clocks::measured(datasets.iter()))?;
     config.validate()?;
-    // A file says what its run starts from, if anything.
+    // A configuration file states what its run starts from, if anything.
     let start = Start::of(args.init.as_deref(), &config, args.config.is_none())?;
     if args.init.is_none()
         && matches!(start, Start::Nothing)
@@ -63,7 +63,7 @@ fn begun(args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
     {
         let name = &network.card.name;
         say(&format!(
-            "starts from nothing, as the configuration names no init (--init {name} starts from the embedded network)"
+            "starting from random weights, as the configuration has no `init` (--init {name} starts from the embedded network)"
         ));
     }
     start.record_in(&mut config)?;
@@ -77,7 +77,7 @@ fn begun(args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
     Ok((trainer, lock))
 }
 
-/// The run in a folder, as it goes on. What is wrong with it is said before the recordings are looked at, too.
+/// The run in a folder, to be continued. Its errors, too, are reported before the recordings are opened.
 fn gone_on_with(out: &Path, args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
     let (folder, _) = RunFolder::open(out)?;
     let lock = RunLock::take(folder.path())?;
@@ -93,14 +93,14 @@ fn gone_on_with(out: &Path, args: &TrainArgs, device: &Device) -> Result<(Traine
         .map_err(|error| resume::where_recordings_are(error, &config, folder.path()))?;
     let settings = config.clone();
     let trainer = Trainer::resume(config, folder.clone(), sets, device)?;
-    // How many epochs are is known now.
+    // The number of steps of the epochs is known only now.
     require_no_fewer_steps(&run, &settings, trainer.step(), trainer.steps())?;
-    // Only settings with which the run goes on.
+    // Written only now, since settings with which the run cannot continue are refused above.
     folder.write_config(&settings, &folder.read_findings()?)?;
     Ok((trainer, lock))
 }
 
-/// Prints what a run starts from, and warns of what may not be meant.
+/// Prints what a run starts from, and warns if that may not be intended.
 pub(super) fn print_start(start: StartReport) {
     match start {
         StartReport::OtherMeaning(warning) => tracing::warn!("{warning}"),
@@ -108,28 +108,28 @@ pub(super) fn print_start(start: StartReport) {
     }
 }
 
-/// As [`print_start`], where an option chooses otherwise.
+/// As [`print_start`], naming the option that chooses another start.
 fn print_default_start(start: StartReport) {
     if matches!(start, StartReport::Packed { path: None, .. }) {
-        say(&format!("{start} (--init none starts from nothing)"));
+        say(&format!("{start} (--init none starts from random weights)"));
     } else {
         print_start(start);
     }
 }
 
-/// A preset takes PoseNet's pose because that is how its network was published, and the recordings know better.
+/// Advice where a preset warps with PoseNet's pose, as its network was published, although the recordings have the vehicle's turns.
 fn unused_turns(trainer: &Trainer, args: &TrainArgs) -> Option<String> {
     let by_default = args.view_motion.is_none() && args.config.is_none() && !args.resume;
     (by_default && leaves_turns_unused(trainer)).then(|| {
         format!(
-            "{} warps by PoseNet's pose, as published; these recordings have a yaw rate, and --view-motion auto learns metres in far fewer steps",
+            "{} warps with PoseNet's pose, as published; these recordings have a yaw rate, with which --view-motion auto learns metres in far fewer steps",
             trainer.config().preset
         )
     })
 }
 
-/// Runs a trainer with its logs, to its last step or until it is asked to stop; with a `pace`, how long it will
-/// take is said.
+/// Runs a trainer with its logs, to its last step or until it is asked to stop; with a `pace`, prints how long it will
+/// take.
 pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSummary> {
     allocator::keep_memory();
     interrupt::catch("stopping after this step; the run is saved");
@@ -148,7 +148,7 @@ pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSu
         duration_text(summary.seconds),
         if summary.skipped > 0 {
             format!(
-                ", {} skipped for a gradient that was not finite",
+                ", {} skipped because of a gradient that was not finite",
                 summary.skipped
             )
         } else {
@@ -158,14 +158,17 @@ pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSu
     Ok(summary)
 }
 
-/// Warns of settings that are another run's. Who says what to begin from has said what is meant.
+/// Warns if the settings are those of one of the runs of a mean. Not needed with `--init`, which states what to start from.
 fn warn_of_mean(file: &Path, config: &TrainConfig, args: &TrainArgs) {
     if args.init.is_none()
         && let Ok(Some(mean)) = SettingsOfMean::of(file, config)
     {
         match &mean.folder {
             Some(folder) => {
-                tracing::warn!("{mean} (--init {} goes on from the mean)", folder.display());
+                tracing::warn!(
+                    "{mean} (--init {} continues from the mean)",
+                    folder.display()
+                );
             }
             None => tracing::warn!("{mean}"),
         }

@@ -16,8 +16,8 @@ pub(super) fn run(args: &ViewArgs) -> Result<()> {
     }
     let folder = Folder::open(&args.folder)?;
     let other = args.other.as_deref().map(Folder::open).transpose()?;
-    let holds = if folder.is_training_run() {
-        "no predictions in this run: its learning curve and panels are shown".to_owned()
+    let contents = if folder.is_training_run() {
+        "no predictions in this run: showing its learning curve and panels".to_owned()
     } else {
         let frames = count_of(folder.frames(), "frame");
         format!("{frames} in {}", args.folder.display())
@@ -27,12 +27,12 @@ pub(super) fn run(args: &ViewArgs) -> Result<()> {
         port: args.port,
     };
     let server = Server::bind(settings, folder, other)?;
-    interrupt::catch("ending");
+    interrupt::catch("stopping");
     output::print(&format!("{}\n", server.url()))?;
     if let Some(url) = server.url_for_others() {
         say(&format!("for other machines: {url}"));
     }
-    say(&format!("{holds}; Ctrl-C ends"));
+    say(&format!("{contents}; stop with Ctrl-C"));
     // A script that reads the address does not want a window.
     if !args.no_open && std::io::stdout().is_terminal() {
         open_browser(&server.url());
@@ -41,7 +41,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<()> {
     Ok(())
 }
 
-/// Opens the page where there is a screen; that it cannot is no failure, the address was printed.
+/// Opens the page if there is a screen. Failing to is no error, since the address was printed.
 fn open_browser(url: &str) {
     let mut command = if cfg!(target_os = "macos") {
         Command::new("open")
@@ -64,7 +64,7 @@ fn open_browser(url: &str) {
         .stderr(Stdio::null())
         .spawn();
     if let Ok(mut opener) = started {
-        // It ends at once, and is waited for lest it stays a zombie while the server runs.
+        // It ends at once. Waiting for it avoids a zombie process while the server runs.
         std::thread::spawn(move || opener.wait());
     }
 }

@@ -1,4 +1,4 @@
-//! `deepfusion view --rerun`: a file for the rerun viewer, where the program was built for it.
+//! `deepfusion view --rerun`: a file for the rerun viewer, if the program was built with it.
 
 use std::path::Path;
 
@@ -36,13 +36,13 @@ pub(super) fn run(args: &ViewArgs, file: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Without the feature: how to get it.
+/// Without the feature: an error whose hint says how to get it.
 #[cfg(not(feature = "rerun"))]
 pub(super) fn run(_args: &ViewArgs, _file: &Path) -> Result<()> {
     Err(CliError::NoRerun.into())
 }
 
-/// The problems of frames, as many as a person reads; the file has them all.
+/// Warns of the frames' problems, up to a readable number; the file has them all.
 #[cfg(feature = "rerun")]
 fn warn(problems: &[(String, deepfusion_view::FrameProblem)]) {
     const SHOWN: usize = 20;

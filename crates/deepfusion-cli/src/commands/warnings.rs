@@ -8,18 +8,18 @@ use deepfusion_data::Dataset;
 use deepfusion_geometry::Intrinsics;
 use deepfusion_jobs::recordings::{placed_warnings, warning_line};
 
-/// Those that were printed: both cameras of a drive, and a recording that is opened again, have the same warnings.
+/// The warnings that were printed. Both cameras of a drive have the same warnings, as does a recording that is opened again.
 static PRINTED: LazyLock<Mutex<HashSet<String>>> = LazyLock::new(Mutex::default);
 
-/// Warns on stderr, unless the same was warned of before.
+/// Warns on stderr, unless the same warning was printed before.
 pub(super) fn warn_once(warning: String) {
     if is_new(&warning) {
         tracing::warn!("{warning}");
     }
 }
 
-/// Warns on stderr of what was taken for granted, looks odd or cannot be read: one line for what several recordings have
-/// in common.
+/// Prints the recordings' warnings on stderr: what was assumed, looks odd or cannot be read. A warning that several recordings share
+/// is one line.
 pub(super) fn print(datasets: &[Dataset]) {
     for warning in datasets.iter().filter_map(Dataset::passed_over) {
         warn_once(warning.to_string());
@@ -35,43 +35,43 @@ pub(super) fn print(datasets: &[Dataset]) {
     }
 }
 
-/// That a camera's numbers look like those of images of another size.
+/// The warning that a camera's intrinsics look like those of images of another size.
 pub(super) fn of_another_size(k: &Intrinsics) -> String {
     format!(
-        "the principal point {:.1}, {:.1} is far from the middle of {}x{}: are the numbers those of images of another size? \
-         Metres are then wrong by the ratio of the two sizes",
+        "the principal point {:.1}, {:.1} is far from the middle of {}x{}: if the intrinsics are for images of another size, \
+         metres are wrong by the ratio of the two sizes",
         k.cx, k.cy, k.width, k.height
     )
 }
 
-/// Warns on stderr of a field of view (`--hfov`) that was hardly meant in degrees.
+/// Warns on stderr of a field of view (`--hfov`) that was probably not given in degrees.
 pub(super) fn warn_of_hfov(degrees: Option<f64>) {
     if let Some(warning) = degrees.and_then(narrow_view) {
         tracing::warn!("{warning}");
     }
 }
 
-/// What may not be meant of a field of view in degrees.
+/// The warning for a field of view that is improbably narrow in degrees.
 fn narrow_view(degrees: f64) -> Option<String> {
-    /// Narrower views are telescopes'.
+    /// Only telephoto lenses have narrower fields of view.
     const NARROW_DEG: f64 = 10.0;
     if degrees >= NARROW_DEG {
         return None;
     }
     let radians = if degrees < PI {
         format!(
-            " (--hfov {:.0}, if these are radians)",
+            " (give --hfov {:.0} if these are radians)",
             degrees.to_degrees()
         )
     } else {
         String::new()
     };
     Some(format!(
-        "--hfov {degrees}: degrees, not radians? A camera with so narrow a view would make every depth very large{radians}"
+        "--hfov {degrees}: expected degrees; a field of view this narrow would make every depth very large{radians}"
     ))
 }
 
-/// Whether that text was not printed before; from now on it was.
+/// Whether a text was not printed before; remembers it as printed.
 fn is_new(text: &str) -> bool {
     let mut printed = PRINTED.lock().unwrap_or_else(PoisonError::into_inner);
     printed.insert(text.to_owned())
@@ -83,15 +83,15 @@ mod tests {
 
     #[test]
     fn a_view_in_radians_is_noticed() {
-        let said = narrow_view(1.2).unwrap();
-        assert!(said.contains("--hfov 69, if these"), "{said}");
-        let said = narrow_view(6.0).unwrap();
-        assert!(said.ends_with("very large"), "{said}");
+        let warning = narrow_view(1.2).unwrap();
+        assert!(warning.contains("--hfov 69 if these"), "{warning}");
+        let warning = narrow_view(6.0).unwrap();
+        assert!(warning.ends_with("very large"), "{warning}");
         assert_eq!(narrow_view(10.0), None);
     }
 
     #[test]
-    fn what_was_printed_is_not_printed_again() {
+    fn a_warning_is_printed_once() {
         assert!(is_new("a warning of this test alone"));
         assert!(!is_new("a warning of this test alone"));
     }

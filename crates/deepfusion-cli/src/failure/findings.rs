@@ -1,10 +1,10 @@
-//! What the command line says of the doctor's findings: the library says what to do, this which options do it.
+//! The doctor's findings in terms of the command's options: the library says what to do, this file which options do it.
 
 use deepfusion_doctor::{Diagnosis, FindingReason, LogReason, MotionReason};
 use deepfusion_hint::Hint;
 use deepfusion_logs::{Error, Format};
 
-/// A diagnosis whose findings name the command's options, as `deepfusion doctor` prints them and its JSON has them.
+/// The diagnosis with hints that name the command's options, as `deepfusion doctor` prints it and writes it as JSON.
 #[must_use]
 pub fn in_options(diagnosis: Diagnosis) -> Diagnosis {
     diagnosis.reworded(|finding| {
@@ -17,26 +17,26 @@ pub fn in_options(diagnosis: Diagnosis) -> Diagnosis {
     })
 }
 
-/// What is wrong, where that speaks of options.
+/// What is wrong, for the findings whose text names options.
 fn what(reason: &FindingReason) -> Option<&'static str> {
     match reason {
         FindingReason::Log(LogReason::NoTurns) => Some(
-            "no turns were recorded: --view-motion vehicle cannot train, and --clock-offset auto uses changes of speed alone",
+            "the turns of the vehicle are unknown: --view-motion vehicle cannot train, and --clock-offset auto has only changes of speed to compare",
         ),
         FindingReason::Log(LogReason::CourseAlone) => Some(
-            "turns are known from positions alone: enough for --clock-offset auto over a few minutes with bends, but not for --view-motion vehicle",
+            "turns are known from positions alone: enough for --clock-offset auto on a few minutes with bends, but not for --view-motion vehicle",
         ),
         _ => None,
     }
 }
 
-/// What to do, where an option does it.
+/// What to do, for the findings that an option settles.
 fn hint(reason: &FindingReason) -> Option<String> {
     match reason {
         FindingReason::Log(reason) => of_log(reason),
         FindingReason::Motion(MotionReason::ClockOffset { camera_ahead_s, .. }) => Some(format!(
-            "set clock.camera_ahead_s = {camera_ahead_s:.3} in dataset.toml or the TOML file beside a bag, or give a clock offset of {:.0} ms (--clock-offset auto measures it \
-             again on opening); better, use one clock for all sensors (PTP, trigger)",
+            "set clock.camera_ahead_s = {camera_ahead_s:.3} in dataset.toml (for a bag, in the TOML file beside it), or give --clock-offset={:.0} \
+             (auto measures it each time); better, give all sensors one clock (PTP, trigger)",
             1e3 * camera_ahead_s
         )),
         _ => None,
@@ -45,10 +45,10 @@ fn hint(reason: &FindingReason) -> Option<String> {
 
 fn of_log(reason: &LogReason) -> Option<String> {
     const AUTO: &str =
-        "data import --clock-offset auto measures what remains of the clocks' offset";
+        "data import --clock-offset auto measures the remaining offset between the clocks";
     Some(match reason {
         LogReason::NoSpeed(_) => {
-            "switch on the camera's GPS and wait for a fix, or import another log: deepfusion data import LOG --video FILE --out DRIVE".into()
+            "switch on the camera's GPS and wait for its fix, or use another log: deepfusion data import LOG --video FILE --out DRIVE".into()
         }
         LogReason::Unreadable(error) => match error.error() {
             Error::Signal { .. } => "give --dbc FILE and --speed Message.Signal".into(),
@@ -58,22 +58,22 @@ fn of_log(reason: &LogReason) -> Option<String> {
             }
             _ => return None,
         },
-        LogReason::TooFast { .. } => "give the unit of speed: --unit km/h (m/s, mph, knots)".into(),
+        LogReason::TooFast { .. } => "give the unit: --unit km/h (or m/s, mph, knots)".into(),
         LogReason::Unsure { .. } => {
             "drive faster or longer, or log the vehicle's own speed: OBD, CAN (--dbc FILE --speed Message.Signal)".into()
         }
         LogReason::Holds { log, format, .. } => format!(
-            "deepfusion data import {}{} --out DRIVE, with the camera as --hfov DEGREES, --intrinsics or --calibration (deepfusion calibrate \
-             measures it); then deepfusion doctor DRIVE",
+            "import it: deepfusion data import {}{} --out DRIVE, with the camera as --hfov DEGREES, --intrinsics or --calibration (deepfusion \
+             calibrate measures it); then run deepfusion doctor DRIVE",
             log.display(),
             // A GoPro's log is in its video.
             if *format == Format::Gpmf { "" } else { " --video FILE" }
         ),
         LogReason::NoTurns | LogReason::CourseAlone => {
-            "use --view-motion posenet or distance, which need no turns, or add a second log with a gyroscope: deepfusion data import LOG GYROSCOPE …".into()
+            "use --view-motion posenet or distance, or add a log with a gyroscope: deepfusion data import LOG GYROSCOPE …".into()
         }
-        LogReason::LocalDates => format!("deepfusion data import … --zone +02:00; {AUTO}"),
-        LogReason::NoDates => format!("deepfusion data import … --start TIME gives it; {AUTO}"),
+        LogReason::LocalDates => format!("give the log's time zone: deepfusion data import … --zone +02:00; {AUTO}"),
+        LogReason::NoDates => format!("give the first frame's time on the log's clock: deepfusion data import … --start TIME; {AUTO}"),
         LogReason::Dates => AUTO.into(),
         _ => return None,
     })

@@ -1,4 +1,4 @@
-//! What the library says of work over recordings and folders, in the command line's words.
+//! The errors of work over recordings and folders, in terms of the command's options.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use deepfusion_records::Difference;
 use super::{Exit, Reportable, set_in_file};
 
 impl Reportable for Error {
-    /// With the options that are meant.
+    /// Names options instead of the library's settings.
     fn message(&self) -> String {
         match self {
             Self::Stale {
@@ -45,56 +45,53 @@ impl Reportable for Error {
             ),
             #[cfg(feature = "train")]
             Self::BesideSets { setting } => format!(
-                "setting `{}`: expected none beside [[data.sets]] in the config file: each set has its own, found both",
+                "`{}`: not allowed beside [[data.sets]] in the config file, where each set has its own",
                 option_of(setting)
             ),
-            #[cfg(feature = "train")]
-            Self::CheckNotStarted { .. } => "cannot start this program again".into(),
-            #[cfg(feature = "train")]
-            Self::CheckNotEnded { .. } => "cannot wait for this program".into(),
             Self::OnlyOnCpu => {
                 "only `--engine burn` runs on devices other than the processor".into()
             }
             Self::OnlyFused { precision } => {
-                format!("`--precision {}` is the fused engine's", precision.name())
+                format!("`--precision {}` needs the fused engine", precision.name())
             }
             Self::OnlyOrt => "`--ort-lib` needs `--engine ort`".into(),
             Self::NoFramework => {
-                "--engine burn, or another device than the processor, needs the training framework, which this build leaves out".into()
+                "`--engine burn` and devices other than the processor need the training framework, which this build leaves out".into()
             }
             other => wrapped(other).map_or_else(|| other.to_string(), Reportable::message),
         }
     }
 
-    /// With the options that do it.
+    /// Names the options to use.
     fn hint_in_options(&self) -> Option<String> {
         if let Some(error) = wrapped(self) {
             return error.hint_in_options();
         }
         match self {
             Self::Exists { .. } => {
-                Some("allow it with --overwrite, or choose another folder".into())
+                Some("replace it with --overwrite, or choose another folder".into())
             }
             Self::LiveFrameExists { .. } => Some(
                 "replace all of its live frames with --overwrite, or choose another folder".into(),
             ),
             Self::Stale { .. } => Some(
-                "--overwrite replaces what was made differently; or choose another folder".into(),
+                "replace outputs that were made differently with --overwrite, or choose another folder".into(),
             ),
             Self::OtherJob { .. } => Some(
-                "start every shard with the same inputs and options; --overwrite begins anew, or choose another folder".into(),
+                "start every shard with the same inputs and options; to start again, use --overwrite or another folder".into(),
             ),
             Self::Busy { .. } => {
-                Some("wait for it, or share the work with --shard I/N, a different I each".into())
+                Some("wait for it, or share the work: --shard I/N with a different I for each process".into())
             }
             Self::Incomplete {
                 of_other_camera: others @ 1..,
                 ..
             } => Some(format!(
-                "{others} of the split's frames are of the other camera: add --camera both"
+                "add --camera both: {others} of the split's frames {} from the other camera",
+                if *others == 1 { "is" } else { "are" }
             )),
             Self::Incomplete { .. } => Some(
-                "give the folder that holds every drive that the split names, or leave --strict out to use what is there".into(),
+                "give the folder with every drive that the split names, or leave out --strict to use the frames that exist".into(),
             ),
             Self::CameraOf { source, .. } => match **source {
                 Self::Camera(_) => self.hint(),
@@ -114,7 +111,7 @@ impl Reportable for Error {
             }
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
             Self::NoUncertainty => Some(
-                "leave out sigma and confidence of --save, and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
+                "leave out sigma and confidence from --save, and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
                     .into(),
             ),
             Self::NothingToPack { .. } => {
@@ -127,10 +124,10 @@ impl Reportable for Error {
             Self::NoSuchDevice {
                 backend, count: 1.., ..
             } => Some(format!(
-                "they are counted from 0: `--device {backend}` takes the one that the backend prefers"
+                "devices are counted from 0; `--device {backend}` uses the one that the backend prefers"
             )),
             Self::NoSuchDevice { .. } => Some(
-                "is the GPU's driver installed, and may this user open it? `--device cpu` computes on the processor".into(),
+                "check that the GPU's driver is installed and that this user may open the GPU, or use --device cpu".into(),
             ),
             Self::OnlyOnCpu => Some("leave out --engine, or give --device cpu".into()),
             Self::OnlyFused { .. } => {
@@ -142,7 +139,7 @@ impl Reportable for Error {
             }
             #[cfg(feature = "train")]
             Self::NotJudged { .. } => Some(
-                "give longer drives with a speed, or more of them with --held-out SHARE; or learn without this check: deepfusion train --data DRIVE --init NETWORK".into(),
+                "give longer drives with a speed, hold out more with --held-out SHARE, or train without this check: deepfusion train --data DRIVE --init NETWORK".into(),
             ),
             #[cfg(feature = "train")]
             Self::NotAdapted { .. } => Some("give the folder that `adapt --out` named".into()),
@@ -159,7 +156,7 @@ impl Reportable for Error {
     }
 }
 
-/// The error of another library that this one only passes on: it is reported as that library's.
+/// The other library's error that this one only passes on, which is reported in its place.
 fn wrapped(error: &Error) -> Option<&dyn Reportable> {
     match error {
         Error::Video(error) => Some(error),
@@ -188,7 +185,7 @@ fn wrapped(error: &Error) -> Option<&dyn Reportable> {
     }
 }
 
-/// What differs, with its options.
+/// What differs, with the options that set it.
 fn options_of(what: Difference) -> &'static str {
     match what {
         Difference::Version => "another program version",
@@ -208,7 +205,7 @@ fn options_of(what: Difference) -> &'static str {
     }
 }
 
-/// What is typed to ask for it.
+/// The requested value as typed on the command line.
 #[cfg(feature = "train")]
 fn typed(asked: &RequestedValue) -> String {
     match asked {
@@ -259,7 +256,7 @@ mod tests {
         let error = Failure::from(Error::BesideSets { setting });
         assert_eq!(
             error.to_string(),
-            "setting `--val-split`: expected none beside [[data.sets]] in the config file: each set has its own, found both"
+            "`--val-split`: not allowed beside [[data.sets]] in the config file, where each set has its own"
         );
         let off = deepfusion_jobs::training::resume::RunHas::Off;
         let contradiction =
@@ -272,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_of_another_size_is_said_at_once() {
+    fn a_camera_of_another_size_is_reported_at_once() {
         let other_size = deepfusion_jobs::UnfitCamera::OtherSize {
             file: None,
             made_for: (640, 480),
@@ -282,9 +279,9 @@ mod tests {
             path: "street.jpg".into(),
             source: Box::new(Error::Camera(other_size.clone())),
         });
-        let said = "street.jpg: the intrinsics do not fit the image: the calibration is for 640x480, the image has 96x64";
-        assert_eq!(photo.to_string(), said);
-        assert_eq!(photo.one_line(), said);
+        let expected = "street.jpg: the intrinsics do not fit the image: the calibration is for 640x480, the image has 96x64";
+        assert_eq!(photo.to_string(), expected);
+        assert_eq!(photo.one_line(), expected);
         // Only a live camera can be asked for another size.
         assert!(!photo.hint().unwrap().contains("?size="));
         let live = Failure::from(Error::Camera(other_size));
@@ -297,7 +294,7 @@ mod tests {
         let error = Failure::from(Error::OnlyFused { precision });
         assert_eq!(
             error.to_string(),
-            "`--precision bf16` is the fused engine's"
+            "`--precision bf16` needs the fused engine"
         );
         for error in [
             Error::OnlyOnCpu,

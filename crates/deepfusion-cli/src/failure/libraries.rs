@@ -1,4 +1,4 @@
-//! What the command line says of the libraries' errors: a library names a setting, this the option that sets it.
+//! The libraries' errors in terms of the command's options: a library names a setting, this file the option that sets it.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -12,7 +12,7 @@ use deepfusion_runtime::EngineProblem;
 
 use super::{Exit, Reportable};
 
-/// Errors whose own hint names no setting that an option has.
+/// Errors whose own hints name no setting that has an option.
 macro_rules! as_the_library_says {
     ($($error:ty),* $(,)?) => {
         $(impl Reportable for $error {
@@ -92,7 +92,7 @@ impl Reportable for deepfusion_rosbag::Error {
     }
 }
 
-/// How to come by a program that reads the bags of ROS 2.
+/// How to get a program that reads ROS 2 bags.
 fn built_with(feature: &str) -> String {
     format!(
         "build with `--features {feature}` to read it: cargo install --path crates/deepfusion-cli --features {feature}"
@@ -111,11 +111,11 @@ impl Reportable for deepfusion_calibrate::Error {
                 seen: Some((columns, rows, _)),
                 ..
             } => Some(format!(
-                "the size counts inner corners, where four squares meet; if that is your board: --board {columns}x{rows}"
+                "count inner corners, where four squares meet; if your board has {columns}x{rows}, give --board {columns}x{rows}"
             )),
             Problem::NoBoard { .. } => self.hint().map(|hint| format!("{hint}: --board 9x6")),
             Problem::Undetermined { .. } => self.hint().map(|hint| {
-                format!("{hint}; of a lens that bends straight lines strongly, give --fisheye")
+                format!("{hint}; for a lens that bends straight lines strongly, give --fisheye")
             }),
             _ => self.hint(),
         }
@@ -126,9 +126,9 @@ impl Reportable for deepfusion_doctor::NoCameraAhead {
     fn hint_in_options(&self) -> Option<String> {
         let hint = self.hint();
         match self {
-            // These end with the offset that is to be given.
+            // These hints end with the offset to give.
             Self::NotFound { .. } | Self::Weak { .. } | Self::Unsure { .. } => hint.map(|hint| {
-                format!("{hint}: --clock-offset MS (without it the clocks count as one)")
+                format!("{hint}: --clock-offset MS (without it the clocks are taken to agree)")
             }),
             _ => hint,
         }
@@ -141,7 +141,7 @@ impl Reportable for deepfusion_logs::Error {
         Some(match self {
             Self::Column { problem, .. } => match problem {
                 Problem::NoSpeedUnit(_) => {
-                    "say it: --unit km/h (or m/s, mph, knots; speed_unit in dataset.toml); a wrong one would scale every depth".into()
+                    "give it: --unit km/h (or m/s, mph, knots; speed_unit in dataset.toml); a wrong unit would scale every depth".into()
                 }
                 _ => return self.hint().map(|hint| {
                     format!("{hint}: --time COLUMN --speed COLUMN (time_column, speed_column in dataset.toml)")
@@ -149,9 +149,9 @@ impl Reportable for deepfusion_logs::Error {
             },
             Self::Signal { .. } => "give --dbc FILE and --speed Message.Signal".into(),
             Self::NoStart { .. } => {
-                "say when the first frame was taken on the log's clock: --start 12:00:03, or in seconds".into()
+                "give the first frame's time on the log's clock: --start 12:00:03, or in seconds".into()
             }
-            Self::Exists { .. } => "choose another --out, or take the file away".into(),
+            Self::Exists { .. } => "choose another --out, or remove the file".into(),
             _ => return self.hint(),
         })
     }
@@ -161,14 +161,14 @@ impl Reportable for deepfusion_video::Error {
     fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Silent { .. } => {
-                Some("check that the source is sending, or set a longer --timeout S".into())
+                Some("check that the source is sending, or wait longer with --timeout S".into())
             }
             _ => self.hint(),
         }
     }
 }
 
-/// The commands that a camera can be given to; the others know it from files alone.
+/// The commands with options for the camera; the others read it from files.
 const TAKE_CAMERA: &str = "predict, perceive, eval, doctor and data inspect also take";
 
 impl Reportable for deepfusion_data::Error {
@@ -267,20 +267,20 @@ impl Reportable for deepfusion_eval::Error {
     fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::InvalidPrediction { kind, .. } => Some(format!(
-                "a network's {kind} is positive everywhere; where these values mean \"no prediction\", pass --allow-holes: \
-                 they are left out and counted as missing_rate"
+                "a network's {kind} is positive everywhere; if these values mean \"no prediction\", pass --allow-holes, \
+                 which leaves them out and counts them in missing_rate"
             )),
             Self::NothingToEvaluate { skipped: 0, .. } => Some(
-                "no scans or depth images of the kind asked for (--gt-depth) lie there; give --gt FILE, or the drive's speeds: with them it is \
-                 judged without ground truth (deepfusion data import LOG --video FILE)"
+                "give --gt FILE, or another --gt-depth if the drive has ground truth of another kind; with the drive's speeds it is \
+                 evaluated without ground truth (deepfusion data import LOG --video FILE)"
                     .into(),
             ),
             Self::NothingToEvaluate { .. } => Some(
-                "check that the ground truth is in metres and 0 where there is none, and that --crop and --cap leave pixels"
+                "check that the ground truth is in metres, with 0 where it is unknown, and that --crop and --cap leave pixels"
                     .into(),
             ),
             Self::Intervals { .. } => {
-                Some("write them anew with `eval --calibrate-uncertainty`".into())
+                Some("write them again with `eval --calibrate-uncertainty`".into())
             }
             _ => self.hint(),
         }
@@ -307,7 +307,7 @@ impl Reportable for deepfusion_instances::Error {
     fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Class { known, .. } if known.is_empty() => {
-                Some("the file names no classes: leave --classes out, and all are taken".into())
+                Some("leave out --classes to use all of them: the file names no classes".into())
             }
             _ => self.hint(),
         }
@@ -340,17 +340,17 @@ impl Reportable for deepfusion_model::Error {
                 Some("train from it first: deepfusion train --data DRIVE --init RUN".into())
             }
             Self::DataSet { .. } => {
-                Some("give the name of the data set whose metres are meant: --data-set NAME".into())
+                Some("name the data set whose metric scale to use: --data-set NAME".into())
             }
             Self::Config { field: "data" | "data.paths", .. } => Some(
-                "give recordings with --data, or as data.paths or [[data.sets]] in the config file, one of the three".into(),
+                "give recordings in one place: with --data, or as data.paths or [[data.sets]] in the config file".into(),
             ),
             Self::Config { field: "view_motion", .. } => Some(
-                "without the speed loss nothing measured may enter: take --view-motion posenet, or keep the speed loss".into(),
+                "use --view-motion posenet, which needs no measured motion, or keep the speed loss".into(),
             ),
             Self::Config { field, .. } => Some(set_in_file(field)),
             Self::NoCheckpoint { .. } => {
-                Some("begin it anew, without --resume, in another folder (--out), or empty this one first".into())
+                Some("start again without --resume, in another folder (--out) or after emptying this one".into())
             }
             Self::NotResumable { .. } => {
                 Some("start a new run from these weights with --init".into())
@@ -377,14 +377,14 @@ impl Reportable for deepfusion_model::Error {
 
 /// Where a key of the configuration is set.
 pub(crate) fn set_in_file(field: &str) -> String {
-    format!("set `{field}` so in the config file, or by its option; --help lists them")
+    format!("set `{field}` accordingly in the config file or with its option (see --help)")
 }
 
 impl Reportable for deepfusion_onnx::Error {
     fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Node { .. } | Self::Model { .. } => {
-                Some("only files written by `deepfusion export` of this version are read".into())
+                Some("export the network again with `deepfusion export` of this version; no other ONNX files can be read".into())
             }
             _ => self.hint(),
         }
@@ -408,7 +408,7 @@ impl Reportable for deepfusion_render::Error {
     fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Log { .. } => {
-                Some("it should be the log.csv that `train` wrote into the run's folder".into())
+                Some("give the log.csv that `train` wrote into the run's folder".into())
             }
             _ => self.hint(),
         }
@@ -435,12 +435,12 @@ impl Reportable for deepfusion_runtime::Error {
                 })
             }
             Self::Engine { reason, .. } => Some(of_engine(reason).unwrap_or(
-                "f32 in the fused engine runs on every processor; with the training framework, `--engine burn` runs \
+                "the fused engine in f32 runs on every processor; with the training framework, `--engine burn` runs \
                  every network on every device"
                     .into(),
             )),
             Self::NotCalibrated | Self::Calibration(_) => Some(
-                "look at some of your images first: deepfusion weights calibrate --model RUN DRIVE; `--precision bf16` needs no calibration"
+                "calibrate it on some of your images first: deepfusion weights calibrate --model RUN DRIVE; `--precision bf16` needs no calibration"
                     .into(),
             ),
             Self::Weights(error) => error.hint_in_options(),
@@ -451,7 +451,7 @@ impl Reportable for deepfusion_runtime::Error {
     }
 }
 
-/// What an engine's problem says of its own.
+/// The hint of an engine's problem.
 fn of_engine(problem: &EngineProblem) -> Option<String> {
     match problem {
         EngineProblem::Fused(error) => error.hint_in_options(),
@@ -499,21 +499,24 @@ impl Reportable for deepfusion_train::Error {
             Self::Model(error) => error.hint_in_options(),
             Self::NoSamples { .. } => self
                 .hint()
-                .map(|hint| format!("{hint}; `deepfusion data inspect` shows what is there")),
+                .map(|hint| format!("{hint}; `deepfusion data inspect` shows what a recording contains")),
             Self::Precision { .. } => Some(set_in_file("precision")),
             Self::CameraKnown { .. } => Some(
-                "leave --intrinsics learn out, or this recording; a known camera is better than a learned one".into(),
+                "leave out --intrinsics learn, or this recording: known intrinsics are better than learned ones".into(),
             ),
             Self::SharedFrames { .. } => Some(
-                "validate on other drives (--val-data) or frames (--val-split); without both, the end of each training drive is held out"
+                "validate on other drives (--val-data) or other frames (--val-split), or leave out both, which holds out the end of each \
+                 drive"
                     .into(),
             ),
             Self::NotFinite { .. } | Self::GradientsNotFinite { .. } => Some(
-                "check the frames named above or lower the learning rate, then continue from the last good checkpoint with --resume"
+                "check the frames named above or lower the learning rate, then continue from the last good \
+                 checkpoint with --resume"
                     .into(),
             ),
             Self::Loader { .. } => Some(
-                "this is a bug: please report it with the lines above; --resume continues from the last checkpoint"
+                "this is a bug: please report it with the lines above; the saved checkpoints are intact, and --resume \
+                 continues from the last"
                     .into(),
             ),
             Self::NoValidation => Some(
@@ -543,15 +546,15 @@ impl Reportable for deepfusion_view::Error {
                 Some("give the folder that `predict` or `perceive` wrote".into())
             }
             Self::NothingToShow { path } => Some(format!(
-                "make something to look at first: deepfusion predict IMAGES --out {}",
+                "predict some images first: deepfusion predict IMAGES --out {}",
                 path.display()
             )),
             Self::PortInUse { .. } => {
-                Some("give another --port, or --port 0 for any that is free".into())
+                Some("give another --port, or --port 0 for any free one".into())
             }
             Self::Listen { source, .. } => Some(match source.kind() {
                 ErrorKind::PermissionDenied => {
-                    "ports below 1024 belong to the system: give --port 8765".into()
+                    "give --port 8765: ports below 1024 are reserved for the system".into()
                 }
                 _ => "give --host an address of this machine, such as 127.0.0.1 or 0.0.0.0".into(),
             }),
@@ -561,14 +564,14 @@ impl Reportable for deepfusion_view::Error {
 
     fn exit(&self) -> Exit {
         match self {
-            // Compiled in or not, the viewer's file has this error.
+            // The viewer's library has this error with and without the feature `rerun`.
             Self::Stopped { .. } => Exit::Stopped,
             _ => Exit::Failed,
         }
     }
 }
 
-/// Other people's errors, which have no hint.
+/// Errors of other people's crates, which have no hint.
 macro_rules! foreign {
     ($($error:ty),* $(,)?) => {
         $(impl Reportable for $error {

@@ -20,12 +20,12 @@ pub(crate) use libraries::set_in_file;
 /// What a command returns.
 pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
 
-/// Results that can say what was being done, and with which file, when something failed.
+/// Adds to an error what was being done, and with which file.
 pub(crate) trait Context<T> {
     /// Puts `what` before an error.
     ///
     /// # Errors
-    /// The same, as a [`Failure`].
+    /// The same error, as a [`Failure`].
     fn context(self, what: impl Into<String>) -> Result<T>;
 }
 
@@ -35,15 +35,15 @@ impl<T, E: Into<Failure>> Context<T> for std::result::Result<T, E> {
     }
 }
 
-/// An error that a command can end with, in the words of the command line: a library knows settings, this one the options that
-/// set them.
+/// An error that a command can end with, in terms of the command line: a library names settings, this trait's methods the options
+/// that set them.
 pub(crate) trait Reportable: Error + Send + Sync + 'static {
     /// What is wrong.
     fn message(&self) -> String {
         self.to_string()
     }
 
-    /// What to do about it, where that is known: the library's [`Hint`](deepfusion_hint::Hint), or which option does it.
+    /// What to do about it, if that is known: the library's [`Hint`](deepfusion_hint::Hint), or which option does it.
     fn hint_in_options(&self) -> Option<String>;
 
     /// How the program ends.
@@ -51,27 +51,27 @@ pub(crate) trait Reportable: Error + Send + Sync + 'static {
         Exit::Failed
     }
 
-    /// The file or folder that is not there, where that is the error.
+    /// The missing file or folder, if that is the error.
     fn missing(&self) -> Option<&Path> {
         None
     }
 }
 
 /// The hint of an error that has none of its own.
-const OURS_TO_MEND: &str =
+const REPORT_BUG: &str =
     "if none of your inputs is at fault, this is a bug: please report it, with the command you ran";
 
-/// The exit code of work that was asked to stop before it was done: what shells give for a program that Ctrl-C ended.
+/// The exit code of work that was stopped before it was done: the one that shells report for a program that Ctrl-C ended.
 pub(crate) const STOPPED: u8 = 130;
 
-/// How the program ends. `train && eval` and a scheduler go by the code alone.
+/// How the program ends. `train && eval` and schedulers see only this code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
     /// Something failed.
     Failed,
     /// An argument is missing or wrong: clap's code.
     WrongArguments,
-    /// Nothing failed, but the work was asked to stop.
+    /// Nothing failed, but the work was stopped.
     Stopped,
 }
 
@@ -85,11 +85,11 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Why a command did not do what it was asked for: an error, and what was being done about which file.
+/// Why a command failed: an error, and what was being done with which file.
 #[derive(Debug)]
 pub(crate) struct Failure {
     error: Box<dyn Reportable>,
-    /// The innermost first.
+    /// What was being done, the innermost first.
     contexts: Vec<String>,
 }
 
@@ -110,7 +110,7 @@ impl fmt::Display for Failure {
 }
 
 impl Failure {
-    /// The same failure of something larger.
+    /// The same failure, with a further, outer context.
     #[must_use]
     pub(crate) fn context(mut self, what: impl Into<String>) -> Self {
         self.contexts.push(what.into());
@@ -122,7 +122,7 @@ impl Failure {
         self.error.hint_in_options()
     }
 
-    /// The file or folder that is not there, where that is the error.
+    /// The missing file or folder, if that is the error.
     pub(crate) fn missing(&self) -> Option<&Path> {
         self.error.missing()
     }
@@ -132,7 +132,7 @@ impl Failure {
         let mut chain = self.chain().into_iter();
         let mut text = chain.next().unwrap_or_default();
         for cause in chain {
-            // Many messages already hold their cause's.
+            // Many messages already contain their cause's.
             if !text.contains(&cause) {
                 text += &format!(": {cause}");
             }
@@ -140,7 +140,7 @@ impl Failure {
         text
     }
 
-    /// Prints it on stderr and says how the program ends.
+    /// Prints the failure on stderr and returns the exit code.
     pub(crate) fn report(&self) -> ExitCode {
         const ERROR: Style = AnsiColor::Red.on_default().bold();
         const HINT: Style = AnsiColor::Cyan.on_default().bold();
@@ -148,16 +148,16 @@ impl Failure {
         let mut last = chain.next().unwrap_or_default();
         let mut text = format!("{ERROR}error:{ERROR:#} {last}\n");
         for cause in chain {
-            // Many messages already hold their cause's.
+            // Many messages already contain their cause's.
             if !last.contains(&cause) {
                 text += &format!("  because: {cause}\n");
                 last = cause;
             }
         }
         let hint = self.hint();
-        let hint = hint.as_deref().unwrap_or(OURS_TO_MEND);
+        let hint = hint.as_deref().unwrap_or(REPORT_BUG);
         text += &format!("{HINT}hint:{HINT:#} {hint}\n");
-        // Where nobody reads it any more, the code still says it.
+        // If stderr is closed, the exit code still reports the failure.
         let _ = anstream::stderr().write_all(text.as_bytes());
         self.error.exit().into()
     }
@@ -179,7 +179,7 @@ mod tests {
     use std::io::ErrorKind;
     use std::path::PathBuf;
 
-    /// No error leaves its reader without a next step, whatever kind it is.
+    /// Every kind of error tells its reader what to do next.
     #[test]
     fn every_error_has_a_hint() {
         let full = std::io::Error::from(ErrorKind::StorageFull);
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn recordings_that_are_missing_are_an_option() {
+    fn missing_recordings_name_their_option() {
         use deepfusion_model::{Error, ExpectedSetting, FoundSetting};
         let error = Error::config("data", ExpectedSetting::Recordings, FoundSetting::Nothing);
         assert_eq!(
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bag_is_read_without_a_unit_of_no_use_by_an_option() {
+    fn an_unusable_inertial_unit_names_the_option_that_leaves_it_out() {
         let (found, norm) = ([0.0; 3], 0.0);
         let error = deepfusion_data::Error::InertialUnit {
             path: "drive.bag".into(),
@@ -226,12 +226,12 @@ mod tests {
     }
 
     #[test]
-    fn causes_follow_the_failure_and_are_not_said_twice() {
+    fn causes_follow_the_failure_and_are_not_repeated() {
         let system = std::io::Error::from(ErrorKind::NotFound);
-        let said = system.to_string();
+        let cause = system.to_string();
         let failure = Failure::from(system).context("log.csv").context("run");
         assert_eq!(failure.to_string(), "run");
-        assert_eq!(failure.one_line(), format!("run: log.csv: {said}"));
+        assert_eq!(failure.one_line(), format!("run: log.csv: {cause}"));
         let path = PathBuf::from("a.png");
         let error = deepfusion_data::Error::file(&path, ErrorKind::PermissionDenied.into());
         let message = error.to_string();

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// What a run left.
+/// The result of a run.
 pub(crate) struct Run {
     /// Its exit code.
     pub code: i32,
@@ -32,12 +32,12 @@ pub(crate) fn in_folder(folder: &Path, args: &[&str]) -> Run {
     }
 }
 
-/// As [`in_folder`], the arguments in one line.
+/// As [`in_folder`], with the arguments in one line.
 pub(crate) fn run(folder: &Path, args: &str) -> Run {
     in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
 }
 
-/// Whether a file is a shard's lock, which stays for good.
+/// Whether a file is a shard's lock, which is never removed.
 pub(crate) fn is_lock(name: &str) -> bool {
     name.starts_with(".predict-") && name.ends_with(".lock")
 }
@@ -49,7 +49,7 @@ pub(crate) fn ok(folder: &Path, args: &str) -> Run {
     run
 }
 
-/// What a run that must succeed prints, as JSON.
+/// The JSON output of a run that must succeed.
 pub(crate) fn json(folder: &Path, args: &str) -> Value {
     serde_json::from_str(&ok(folder, args).stdout).unwrap()
 }

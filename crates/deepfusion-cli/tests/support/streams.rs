@@ -1,4 +1,4 @@
-//! Streams of frames that know their numbers, and ways to send them.
+//! Streams of frames that encode their numbers, and ways to send them.
 
 use std::ffi::OsStr;
 use std::io::{Read, Write};
@@ -11,7 +11,7 @@ use super::Run;
 
 const SIZE: (usize, usize) = (320, 96);
 
-/// How bright a frame of [`stream`] is, as RGB: each knows its number.
+/// Brightness of a frame of [`stream`], as RGB, which encodes its number.
 pub(crate) fn brightness(number: usize) -> u8 {
     // A video's black is 16, and its white 235.
     ((u32::from(luma(number)) - 16) * 255 / 219) as u8
@@ -21,7 +21,7 @@ fn luma(number: usize) -> u8 {
     (16 + number * 37 % 200) as u8
 }
 
-/// Frames of one grey each, as YUV4MPEG.
+/// Frames of uniform grey, as YUV4MPEG.
 pub(crate) fn stream(frames: usize) -> Vec<u8> {
     stream_of(SIZE, frames)
 }
@@ -37,7 +37,7 @@ pub(crate) fn stream_of((w, h): (usize, usize), frames: usize) -> Vec<u8> {
     bytes
 }
 
-/// Runs the program with a stream on its standard input, sent as fast as it is taken.
+/// Runs the program with a stream on its standard input, sent as fast as it is read.
 pub(crate) fn piped(folder: &Path, args: &str, bytes: Vec<u8>) -> Run {
     let mut child = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
         .current_dir(folder)
@@ -48,7 +48,7 @@ pub(crate) fn piped(folder: &Path, args: &str, bytes: Vec<u8>) -> Run {
         .spawn()
         .unwrap();
     let mut input = child.stdin.take().unwrap();
-    // It may have enough before the end.
+    // The program may stop reading before the end.
     let sender = std::thread::spawn(move || input.write_all(&bytes).ok());
     let output = child.wait_with_output().unwrap();
     sender.join().unwrap();
@@ -70,7 +70,7 @@ fn run_of(output: Output) -> Run {
     }
 }
 
-/// Answers one request as a camera's server would, and does with the connection what the test wants.
+/// Answers one request as a camera's server would, and passes the connection to the test.
 pub(crate) fn serve(answer: impl FnOnce(TcpStream) + Send + 'static) -> (String, JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("http://{}/live", listener.local_addr().unwrap());

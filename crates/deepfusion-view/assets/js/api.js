@@ -13,7 +13,7 @@ async function get(path) {
   const answer = await fetch(path);
   if (answer.ok) return answer;
   let body = {};
-  try { body = await answer.json(); } catch { /* not JSON of this server */ }
+  try { body = await answer.json(); } catch { /* not this server's JSON */ }
   throw new Problem(body.error ?? `${answer.status} ${answer.statusText}`, body.hint, answer.status);
 }
 

@@ -11,7 +11,7 @@ export class Cache {
   get(key) {
     const entry = this.entries.get(key);
     if (!entry) return undefined;
-    // A map gives its entries in the order in which they came: the last used goes to the end.
+    // A map keeps its entries in insertion order, so the last used one is moved to the end.
     this.entries.delete(key);
     this.entries.set(key, entry);
     return entry.value;

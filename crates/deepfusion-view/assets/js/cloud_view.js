@@ -10,12 +10,12 @@ import { LINES, POINTS, program } from './shaders.js';
 
 const MOST_POINTS = matchMedia('(pointer: coarse)').matches ? 400_000 : 1_200_000;
 const MOST_PATCHES = MOST_POINTS / 3;
-/** While the view moves on a machine that cannot keep up. */
+/** Most points while the view moves on a machine that cannot draw all of them fast enough. */
 const COARSE_POINTS = 60_000;
 const MODES = { picture: 0, depth: 1, height: 2 };
 const VIEW_NAMES = { chase: 'Chase', top: 'Top', side: 'Side', eye: 'Camera' };
 
-/** Whether there is no graphics card behind WebGL: edges are then not smoothed, and a moving view is drawn coarsely. */
+/** Whether WebGL runs without a GPU: edges are then not smoothed, and a moving view is drawn coarsely. */
 export function drawnBySoftware() {
   const gl = document.createElement('canvas').getContext('webgl2');
   const info = gl?.getExtension('WEBGL_debug_renderer_info');
@@ -160,7 +160,7 @@ export class CloudView {
     gl.uniform1i(at.mode, options.mode === 'picture' && !this.hasPicture ? 1 : MODES[options.mode]);
     gl.uniform2f(at.range, app.colours.scale.near_m, app.colours.scale.far_m);
     gl.uniform1f(at.farthest, options.farthest);
-    // The ground is the plane that passes closest: what is steeper by far is no surface.
+    // The ground is the plane that passes closest to the camera; anything much steeper is not a surface.
     const closest = 0.55 * Math.max(0.1, frame.ground.offset);
     gl.uniform1f(at.steepest, options.edges ? 1 / closest : 0);
     gl.uniform1f(at.tear, 1 / closest);
@@ -247,7 +247,7 @@ export class CloudView {
     for (const button of this.element.querySelectorAll('[data-view]')) button.setAttribute('aria-pressed', String(app.orbit.name === button.dataset.view));
     this.surfaceButton.textContent = options.surface ? 'Surface' : 'Points';
     this.modeButton.textContent = { picture: 'Colour', depth: 'Depth', height: 'Height' }[options.mode];
-    const problem = !this.gl ? 'This browser has no WebGL 2, which the cloud needs. Picture and depth work without.'
+    const problem = !this.gl ? 'This browser has no WebGL 2, which the cloud needs. Picture and depth work without it.'
       : frame && frame.depth && !frame.camera ? 'No cloud: the camera is unknown.' : null;
     this.problem.hidden = !problem;
     if (problem) this.problem.textContent = problem;
@@ -277,7 +277,7 @@ export class CloudView {
         const sy = halfHeight - (m[1] * px + m[5] * py + m[9] * d + m[13]) / w * halfHeight - y;
         const off = sx * sx + sy * sy;
         if (off > 81) continue;
-        // What is near the eye hides what is behind it.
+        // Points near the eye hide those behind them.
         const score = w * (1 + off / 60);
         if (score < bestScore) [best, bestScore] = [{ u, v, d }, score];
       }

@@ -1,15 +1,15 @@
-// Colours: depth by the logarithm of metres as in the pictures that `predict` writes, differences, tracks.
+// Colours of depth (on a logarithmic scale, as in the pictures that `predict` writes), of differences and of tracks.
 
-/** The colour of what has no depth. */
+/** The colour of pixels without depth. */
 export const NOTHING = [40, 40, 44];
 const packed = ([r, g, b]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
 
-/** Lays the session's colour tables out for looking up. */
+/** Prepares look-up tables from the session's colour tables. */
 export class Colours {
   constructor(session) {
     this.scale = session.depth_scale;
     this.diverging = session.colours.diverging;
-    // One entry per step of 1/256 m: a picture then needs one look-up per pixel. Bytes in memory are r, g, b, a on every machine of today.
+    // One entry per step of 1/256 m, so that a picture needs one look-up per pixel. Bytes in memory are r, g, b, a on all current machines.
     this.bySteps = new Uint32Array(65536);
     this.bySteps[0] = packed(NOTHING);
     for (let step = 1; step < 65536; step++) this.bySteps[step] = packed(this.ofDepth(step / 256));
@@ -45,7 +45,7 @@ export function ticks(near, far) {
   return inside;
 }
 
-/** A track's colour: hues far apart for ids that follow each other. */
+/** A track's colour: distant hues for consecutive ids. */
 export function ofTrack(id, light) {
   const hue = (Number(id) * 137.508 + 20) % 360;
   return rgbOfHsl(hue, 0.75, light ? 0.38 : 0.64);
@@ -79,7 +79,7 @@ function lookUp(name) {
 
 export const css = ([r, g, b], alpha = 1) => `rgb(${r} ${g} ${b} / ${alpha})`;
 
-/** A target's colour: by its track, or by whether it moves. */
+/** A target's colour: by its track, or by whether it is dynamic. */
 export function ofTarget(target, byTrack, light) {
   if (byTrack) return ofTrack(target.id ?? 0, light);
   return themeColour(target.moving === true ? '--moving' : target.moving === false ? '--static' : '--unknown');

@@ -19,7 +19,7 @@ export class Depth {
     const steps = head.getUint32(12, true) === 0;
     this.values = steps ? new Uint16Array(buffer, 16) : new Float32Array(buffer, 16);
     this.perMetre = steps ? 256 : 1;
-    if (this.values.length !== this.width * this.height) throw new Error('the depth that was sent is not whole');
+    if (this.values.length !== this.width * this.height) throw new Error('the depth that was sent is incomplete');
     this.bytes = buffer.byteLength;
   }
 
@@ -30,7 +30,7 @@ export class Depth {
     return value > 0 && Number.isFinite(value) ? value : 0;
   }
 
-  /** All metres, into a buffer that is used again. */
+  /** All metres, in a buffer that is reused. */
   metres() {
     if (this.perMetre === 1) return this.values;
     const out = scratchFloats(this.values.length);

@@ -11,7 +11,7 @@ export function project(k, [x, y, z]) {
   return z > 1e-3 ? [k.fx * x / z + k.cx, k.fy * y / z + k.cy] : null;
 }
 
-/** The point at camera z = depth that is seen at a pixel. */
+/** The point at camera z = depth that projects to a pixel. */
 export function backProject(k, u, v, depth) {
   return [(u - k.cx) / k.fx * depth, (v - k.cy) / k.fy * depth, depth];
 }
@@ -38,7 +38,7 @@ export const BOX_EDGES = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7]
 /** The front's diagonals: where the target's length points. */
 export const FRONT_EDGES = [[0, 5], [1, 4]];
 
-/** The part of an edge before the plane z = near, as two pixels; null where all of it is behind. */
+/** The part of an edge in front of the plane z = near, as two pixels; null if all of it is behind. */
 export function projectEdge(k, a, b, near = 0.1) {
   if (a[2] < near && b[2] < near) return null;
   const cut = (p, q) => {
@@ -50,7 +50,7 @@ export function projectEdge(k, a, b, near = 0.1) {
   return [project(k, a), project(k, b)];
 }
 
-/** A 3x4 row-major motion from what was read (nested rows or twelve numbers); null if it is not one. */
+/** A 3x4 row-major motion from JSON (nested rows or twelve numbers); null if it is not one. */
 export function motion(value) {
   const m = Array.isArray(value) ? value.flat() : [];
   return (m.length === 12 || m.length === 16) && m.every(Number.isFinite) ? m.slice(0, 12) : null;
@@ -107,7 +107,7 @@ export function lookAt(eye, target, up) {
   ]);
 }
 
-/** Where a point lands in a viewport of the given size: x, y in pixels and its distance along the view; null behind the eye. */
+/** Position of a point in a viewport of the given size: x, y in pixels and its distance along the view; null behind the eye. */
 export function toScreen(viewProjection, [x, y, z], width, height) {
   const m = viewProjection, w = m[3] * x + m[7] * y + m[11] * z + m[15];
   if (w < 0.05) return null;

@@ -1,4 +1,4 @@
-// Mouse, pen and fingers on a canvas, reported by the same names.
+// Gestures of mouse, pen and fingers on a canvas, under common names.
 
 /**
  * Calls `on.hover(x, y)`, `on.leave()`, `on.drag(dx, dy, {secondary, touch, x, y})`, `on.pinch(factor, x, y, dx, dy)`,
@@ -18,7 +18,7 @@ export function gestures(element, on) {
   element.addEventListener('contextmenu', e => e.preventDefault());
   element.addEventListener('pointerdown', e => {
     // Synthetic events have no pointer to capture.
-    try { element.setPointerCapture(e.pointerId); } catch { /* as said */ }
+    try { element.setPointerCapture(e.pointerId); } catch { /* synthetic */ }
     if (pointers.size === 0) moved = 0;
     pointers.set(e.pointerId, place(e));
     if (e.pointerType === 'touch' && pointers.size === 1) on.hover?.(...place(e), true);
@@ -49,13 +49,13 @@ export function gestures(element, on) {
   element.addEventListener('pointerleave', e => { if (e.pointerType !== 'touch') on.leave?.(); });
   element.addEventListener('wheel', e => {
     e.preventDefault();
-    // Lines and pages as pixels.
+    // Converts lines and pages to pixels.
     const unit = e.deltaMode === 1 ? 16 : e.deltaMode === 2 ? 400 : 1;
     on.wheel?.(Math.max(-240, Math.min(240, e.deltaY * unit)), ...place(e));
   }, { passive: false });
 }
 
-/** Keeps a canvas at the screen's resolution. Returns whether its size changed. */
+/** Adapts a canvas to the screen's resolution. Returns whether its size changed. */
 export function fit(canvas, most = 2) {
   const ratio = Math.min(devicePixelRatio || 1, most), box = canvas.getBoundingClientRect();
   const width = Math.max(1, Math.round(box.width * ratio)), height = Math.max(1, Math.round(box.height * ratio));

@@ -1,11 +1,11 @@
-// What the keys do: one table, for the help and for the keyboard.
+// The keys and their actions: one table for the help and the keyboard.
 
-/** Groups of [keys as they are shown, keys as events name them, what they do, action of the app]. */
+/** Groups of [keys as shown, keys as in events, description, action of the app]. */
 export const KEYS = [
   ['Time', [
     [['Space'], [' '], 'play, pause', app => app.player.toggle()],
-    [['←'], ['ArrowLeft'], 'back; with Shift ten', (app, e) => app.step(e.shiftKey ? -10 : -1)],
-    [['→'], ['ArrowRight'], 'on; with Shift ten', (app, e) => app.step(e.shiftKey ? 10 : 1)],
+    [['←'], ['ArrowLeft'], 'back (Shift: ten frames)', (app, e) => app.step(e.shiftKey ? -10 : -1)],
+    [['→'], ['ArrowRight'], 'forward (Shift: ten frames)', (app, e) => app.step(e.shiftKey ? 10 : 1)],
     [['Home'], ['Home'], 'first frame', app => app.seek(0)],
     [['End'], ['End'], 'last frame', app => app.seek(app.runs[0].length - 1)],
     [['<', '>'], ['<', '>'], 'slower, faster', (app, e) => app.player.faster(e.key === '<' ? -1 : 1)],
@@ -18,12 +18,12 @@ export const KEYS = [
     [['4'], ['4'], 'from the camera', app => app.go('eye')],
     [['M'], ['m'], 'colour by picture, depth, height', app => app.nextMode()],
     [['E'], ['e'], 'hide points at depth edges', app => app.flip('edges')],
-    [['U'], ['u'], 'fade what is unsure', app => app.flip('fade')],
+    [['U'], ['u'], 'fade uncertain pixels', app => app.flip('fade')],
     [['S'], ['s'], 'surface, points', app => app.flip('surface')],
-    [['[', ']'], ['[', ']'], 'how far the cloud reaches', (app, e) => app.reach(e.key === '[' ? -1 : 1)],
+    [['[', ']'], ['[', ']'], 'range of the cloud', (app, e) => app.reach(e.key === '[' ? -1 : 1)],
     [['-', '+'], ['-', '+', '='], 'size of the points', (app, e) => app.pointSize(e.key === '-' ? 1 / 1.25 : 1.25)],
   ]],
-  ['Shown', [
+  ['View', [
     [['P'], ['p'], 'picture', app => app.pane('picture')],
     [['D'], ['d'], 'depth', app => app.pane('depth')],
     [['C'], ['c'], 'cloud', app => app.pane('cloud')],
@@ -33,18 +33,18 @@ export const KEYS = [
     [['N'], ['n'], 'numbers at the boxes', app => app.flip('labels')],
     [['I'], ['i'], 'colour by track, or by motion', app => app.flip('byTrack')],
     [['G'], ['g'], 'rings on the ground', app => app.flip('ground')],
-    [['X'], ['x'], 'two runs: depth against the first', app => app.flip('difference')],
+    [['X'], ['x'], 'two runs: depth relative to the first', app => app.flip('difference')],
   ]],
   ['Page', [
-    [['R'], ['r'], 'views as at the start', app => app.resetViews()],
+    [['R'], ['r'], 'reset views', app => app.resetViews()],
     [['Y'], ['y'], 'dark, light', app => app.nextTheme()],
     [['F'], ['f'], 'full screen', () => document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen?.()],
-    [['Esc'], ['Escape'], 'let go of the target', app => app.choose(0, null)],
+    [['Esc'], ['Escape'], 'deselect the target', app => app.choose(0, null)],
     [['?'], ['?'], 'this help', app => help(app)],
   ]],
 ];
 
-/** Runs what a key means; whether it means anything. */
+/** Runs a key's action. Returns whether it has one. */
 export function onKey(app, e) {
   if (e.ctrlKey || e.metaKey || e.altKey) return false;
   const key = e.key.length === 1 ? e.key.toLowerCase() : e.key;
@@ -57,8 +57,8 @@ export function help() {
   if (dialog.open) return dialog.close();
   const groups = KEYS.map(([name, keys]) => `<section><h3>${name}</h3>${keys.map(([shown, , what]) => `<div><span>${what}</span><span>${shown.map(k => `<kbd>${k.replace('<', '&lt;')}</kbd>`).join('')}</span></div>`).join('')}</section>`);
   dialog.innerHTML = `<button class="close" aria-label="Close">✕</button><h2>Keys</h2><div class="keys">${groups.join('')}</div>`
-    + '<p>Pictures: the pointer shows metres, the wheel zooms, dragging moves, a double click shows all. Cloud: dragging turns, with Shift or the right button moves, the wheel comes nearer, a double click turns about that point. A click on a box chooses its track.</p>'
-    + '<p>Fingers: one shows metres or turns the cloud, two zoom and move, a double tap shows all.</p>';
+    + '<p>Pictures: the pointer shows metres, the wheel zooms, dragging moves, a double click shows everything. Cloud: dragging rotates (with Shift or the right button, moves), the wheel zooms, a double click rotates about that point. A click on a box selects its track.</p>'
+    + '<p>Fingers: one shows metres or rotates the cloud, two zoom and move, a double tap shows everything.</p>';
   dialog.querySelector('.close').onclick = () => dialog.close();
   dialog.onclick = e => { if (e.target === dialog) dialog.close(); };
   dialog.showModal();

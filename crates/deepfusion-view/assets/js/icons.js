@@ -1,4 +1,4 @@
-// Signs on buttons.
+// Icons of the buttons.
 
 const svg = path => `<svg viewBox="0 0 16 16" aria-hidden="true"><path d="${path}"/></svg>`;
 

@@ -1,4 +1,4 @@
-// The page: what is shown, and who draws it.
+// The page's state, and which parts draw it.
 
 import * as api from './api.js';
 import { CloudView, drawnBySoftware } from './cloud_view.js';
@@ -25,7 +25,7 @@ class App {
     this.colours = new Colours(session);
     this.runs = session.runs.map((info, i) => new Run(i, info));
     this.frame = 0;
-    /** The pictures' common zoom, and the place (0 to 1) in their middle. */
+    /** The pictures' common zoom, and the position (0 to 1) at their centre. */
     this.view = { zoom: 1, x: 0.5, y: 0.5 };
     this.options = {
       picture: true, depth: true, cloud: true, list: true, boxes: true, tracks: true, labels: true, ground: true, edges: true, byTrack: false,
@@ -46,7 +46,7 @@ class App {
 
   // Frames.
 
-  /** The place in run `r` of the first run's frame `i`: the frame of the same name, or, where no name is shared, of the same number. */
+  /** The index in run `r` of the first run's frame `i`: the frame of the same name or, if no name is shared, of the same number. */
   placeOf(r, i) {
     if (r === 0) return i < this.runs[0].length ? i : undefined;
     const run = this.runs[r];
@@ -91,7 +91,7 @@ class App {
     this.touch('scene', 'time');
   }
 
-  /** Goes to a frame; one that is not loaded is fetched, and shown if it is still wanted then. */
+  /** Goes to a frame. If it is not loaded, it is fetched, and shown if it is still wanted then. */
   async seek(i) {
     const n = this.runs[0].length;
     if (!n) return;
@@ -104,7 +104,7 @@ class App {
       return place === undefined ? null : run.load(place);
     }));
     if (this.frame !== wanted) return;
-    // A frame that the server did not send is shown with its problem.
+    // A frame that could not be fetched is shown with its problem.
     this.shownFrames = frames.map(f => f ?? null);
     this.runs.forEach((run, r) => { run.show(this.shownFrames[r]); });
     if (frames.some(f => f?.lost)) this.lost = true;
@@ -118,7 +118,7 @@ class App {
     return this.seek(this.frame + by);
   }
 
-  // What is chosen and pointed at.
+  // The selected target and the pointer.
 
   point(pointer) {
     this.pointer = pointer;
@@ -130,7 +130,7 @@ class App {
     const metres = this.metresUnderPointer(r), frame = this.shown(r);
     if (!metres || !frame?.camera) return null;
     const k = frame.camera, { x, y, depth } = this.pixelUnderPointer(r);
-    // The pixel's centre, which the depth belongs to.
+    // Depth belongs to the pixel's centre.
     return geometry.backProject(geometry.resizedCamera(k, depth.width, depth.height), x, y, metres);
   }
 
@@ -219,16 +219,16 @@ class App {
     remember(`panes-${this.shape()}`, JSON.stringify({ picture, depth, cloud, list }));
   }
 
-  /** Panes are remembered for each kind of screen, and for one run and two. */
+  /** Panes are stored separately for each kind of screen, and for one and two runs. */
   shape() { return `${narrow() ? 'narrow' : 'wide'}-${this.runs.length}`; }
 
   restore() {
-    // Two clouds need the room.
+    // Two clouds need the space.
     if (this.runs.length > 1) this.options.list = false;
     for (const key of ['options', `panes-${this.shape()}`]) {
       try {
         for (const [name, value] of Object.entries(JSON.parse(stored(key) ?? '{}'))) if (typeof value === typeof this.options[name]) this.options[name] = value;
-      } catch { /* another version's */ }
+      } catch { /* stored by another version */ }
     }
   }
 
@@ -259,7 +259,7 @@ class App {
       this.panes.push(...left);
       if (left.length) columns.push(column(left));
       if (!two && options.cloud) { columns.push(column([kinds.cloud])); this.panes.push(kinds.cloud); }
-      // The pictures share what is left where nothing else takes it.
+      // The pictures share the remaining space if nothing else takes it.
       const greedy = !showList && !(cloudBelow && options.cloud);
       left.forEach(pane => pane.element.classList.toggle('rest', greedy && pane.kind !== undefined));
     });
@@ -289,15 +289,15 @@ class App {
       gap(),
       hasTargets && button('Boxes', options.boxes, () => this.flip('boxes'), 'Boxes (B)', true),
       hasTargets && button('Tracks', options.tracks, () => this.flip('tracks'), 'Tracks (T)', true),
-      hasSigma && button('Fade', options.fade, () => this.flip('fade'), 'Fade what is unsure (U)'),
-      two && button('Difference', options.difference, () => this.flip('difference'), 'Depth against the first run (X)'),
+      hasSigma && button('Fade', options.fade, () => this.flip('fade'), 'Fade uncertain pixels (U)'),
+      two && button('Difference', options.difference, () => this.flip('difference'), 'Depth relative to the first run (X)'),
       gap(),
       button('theme', null, () => this.nextTheme(), 'Dark or light (Y)'),
       button('help', null, () => help(), 'Keys (?)'),
     ].filter(Boolean));
   }
 
-  // Drawing, once a frame of the screen at most.
+  // Drawing, at most once per screen refresh.
 
   touch(...what) {
     for (const w of what) this.dirty.add(w);
@@ -312,7 +312,7 @@ class App {
     });
   }
 
-  /** Draws the cloud coarser while things move faster than it can be drawn, and finely again once they rest. */
+  /** Draws the cloud coarsely while the view moves faster than it can be drawn, and finely again once it rests. */
   pace(now) {
     const gap = now - (this.drawnAt ?? -Infinity);
     this.drawnAt = now;
@@ -320,7 +320,7 @@ class App {
     if (gap > (this.player.playing ? 3000 : 350)) this.gaps = [];
     else {
       if (this.software) this.coarse = true;
-      // A frame of the recording comes when it is due: only what is later than that is slow.
+      // While playing, frames are due at intervals: only later ones are slow.
       const due = this.player.playing ? 1000 / (this.player.fps * this.player.rate) : 0;
       this.gaps = [...this.gaps, gap - due].slice(-5);
       if (this.gaps.length === 5 && this.gaps.reduce((a, b) => a + b) / 5 > 45) this.coarse = true;
@@ -329,7 +329,7 @@ class App {
   }
 
   draw(scene, time) {
-    // Pictures first: they set the panes' shapes.
+    // Pictures first, since they set the panes' shapes.
     for (const pane of this.panes ?? []) pane.draw(scene);
     if (scene) this.facts();
     if (time || scene) this.time();
@@ -378,12 +378,12 @@ class App {
     }
   }
 
-  /** Which optional data there are: the buttons depend on it. */
+  /** Which optional data exist, which decides the buttons. */
   shownOf() {
     return this.runs.map(r => [r.series.targets?.some(v => v !== null), r.hasSigma?.some(Boolean)].map(Boolean)).join();
   }
 
-  // The folders, as they grow.
+  // Growing folders.
 
   async watch() {
     try {
@@ -395,7 +395,7 @@ class App {
       if (changed) {
         const [run] = this.runs, grown = run.length > before && before > 0;
         if (grown) this.grownAt = performance.now();
-        // Stay on the same frame, wherever it is now; follow the newest if the last one was shown.
+        // Stay on the same frame, whatever its index is now; follow the newest if the last one was shown.
         const follow = grown && this.live && this.following;
         this.frame = follow ? run.length - 1 : run.places.get(name) ?? Math.min(this.frame, Math.max(0, run.length - 1));
         if (this.shownOf() !== had) this.build();
@@ -414,12 +414,12 @@ class App {
   }
 
   async start() {
-    // Before anything is drawn: the address then follows the frame.
+    // Read before the first drawing, which writes the frame into the address.
     const wanted = decodeURIComponent(location.hash.slice(1));
     await Promise.all(this.runs.map(run => run.refresh()));
     this.restore();
     if (narrow() && stored(`panes-${this.shape()}`) === null) {
-      // A high picture leaves no room for two and the cloud.
+      // A tall picture leaves no room for a second one and the cloud.
       const { size } = await api.frame(0, this.runs[0].names[0]).then(f => ({ size: f.intrinsics ?? { width: f.picture?.size[0], height: f.picture?.size[1] } })).catch(() => ({}));
       this.options.depth = !(size?.height > 0.55 * size?.width);
       this.options.list = false;
@@ -443,7 +443,7 @@ class App {
       if (typing || (e.key === ' ' && e.target.closest?.('button'))) return;
       if (onKey(this, e)) e.preventDefault();
     });
-    // A button that was clicked keeps no key for itself.
+    // A clicked button loses the focus, so that it does not catch keys.
     addEventListener('click', e => { if (e.detail > 0) e.target.closest?.('button')?.blur(); });
     this.build();
     let wasNarrow = narrow();
@@ -452,7 +452,7 @@ class App {
     }).observe($('stage'));
     matchMedia('(prefers-color-scheme: light)').addEventListener('change', () => this.theme());
     await this.seek(this.runs[0].places.get(wanted) ?? 0);
-    // Pictures give the panes their shapes: once more, with these.
+    // The pictures have given the panes their shapes: draw again with these.
     this.touch('scene', 'time');
     setTimeout(() => this.watch(), 300);
   }
@@ -461,7 +461,7 @@ class App {
 const narrow = () => matchMedia('(max-width: 820px), (max-aspect-ratio: 3/4)').matches && !matchMedia('(max-height: 520px) and (orientation: landscape)').matches;
 
 // Private windows may refuse to store anything.
-function remember(key, value) { try { localStorage.setItem(`deepfusion-${key}`, value); } catch { /* then not */ } }
+function remember(key, value) { try { localStorage.setItem(`deepfusion-${key}`, value); } catch { /* not stored */ } }
 function stored(key) { try { return localStorage.getItem(`deepfusion-${key}`); } catch { return null; } }
 
 function message(title, text) {
@@ -471,7 +471,7 @@ function message(title, text) {
   $('stage').replaceChildren(element);
 }
 
-/** The interface for tests and the console. */
+/** Interface for tests and the console. */
 const hook = window.deepfusion = { ready: false, geometry };
 
 try {
@@ -489,7 +489,7 @@ try {
   }
   hook.ready = true;
 } catch (error) {
-  message('This cannot be shown', error.message);
+  message('Cannot show this folder', error.message);
   hook.failure = error.message;
   throw error;
 }

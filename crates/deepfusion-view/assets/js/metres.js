@@ -1,4 +1,4 @@
-// Describes how far a frame's metres can be trusted.
+// Describes how far the scale of a frame's depth can be trusted.
 
 /** Value, state and rank of the fact "Metres"; null if the sidecar has no such field. `meta` is a frame as sent by the server. */
 export function metresFact(meta) {
@@ -7,8 +7,8 @@ export function metresFact(meta) {
   if (scale?.verdict === 'wrong') return [`wrong${factor(scale)}`, 'bad'];
   if (scale?.verdict === 'trusted') return [`trusted${factor(scale)}`, 'good', 'less'];
   if (scale?.verdict === 'open') return [Number.isFinite(scale.bias) ? `open${factor(scale)}` : 'scale not verified', '', 'less'];
-  // From versions that recorded no more than whether the camera was known.
-  if (meta?.scale_trusted === false) return ['not to be trusted', 'warn'];
+  // From older versions, which recorded only whether the camera was known.
+  if (meta?.scale_trusted === false) return ['not trusted', 'warn'];
   return null;
 }
 

@@ -1,4 +1,4 @@
-// The eye that looks at the cloud: it turns about a point. Both runs share it.
+// The viewpoint of the cloud, which orbits about a point. Both runs share it.
 
 import { lookAt, multiply, perspective } from './geometry.js';
 
@@ -29,7 +29,7 @@ export class Orbit {
     this.glide(view, name);
   }
 
-  /** Turns about another point. */
+  /** Orbits about another point. */
   focus(point) { this.glide({ target: point, distance: Math.min(this.distance, 18), yaw: this.yaw, pitch: this.pitch, fov: this.fov }, 'free'); }
 
   glide(to, name) {
@@ -89,7 +89,7 @@ export class Orbit {
   }
 
   viewProjection(aspect) {
-    // A tall window would see a slit: its width then has the angle.
+    // In a tall window the field of view applies to the width; otherwise only a slit would be visible.
     const fov = aspect < 1 && this.name !== 'eye' ? 2 * Math.atan(Math.tan(this.fov / 2) / Math.max(aspect, 0.55)) : this.fov;
     return multiply(perspective(fov, aspect, 0.1, 600), lookAt(this.eye(), this.target, [0, -1, 0]));
   }

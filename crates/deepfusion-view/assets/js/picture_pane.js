@@ -1,4 +1,4 @@
-// A picture or a depth map, with boxes, a cross where the pointer is in any pane, and a zoom that all pictures share.
+// A picture or a depth map, with boxes, a cross at the pointer's position in any pane, and a zoom that all pictures share.
 
 import { NOTHING, css, ofTarget, themeColour, ticks } from './colour.js';
 import { BOX_EDGES, FRONT_EDGES, boxCorners, project, projectEdge } from './geometry.js';
@@ -48,7 +48,7 @@ export class PicturePane {
     const [w, h] = this.pixels ?? [16, 9];
     const scale = Math.min(width / w, height / h) * this.app.view.zoom;
     const { x, y } = this.app.view;
-    // Centred where the picture is smaller than the pane.
+    // Centred if the picture is smaller than the pane.
     const left = w * scale <= width ? (width - w * scale) / 2 : Math.min(0, Math.max(width - w * scale, width / 2 - x * w * scale));
     const top = h * scale <= height ? (height - h * scale) / 2 : Math.min(0, Math.max(height - h * scale, height / 2 - y * h * scale));
     return { left, top, width: w * scale, height: h * scale, scale, pane: { width, height } };
@@ -83,7 +83,7 @@ export class PicturePane {
     this.app.touch('marks');
   }
 
-  /** The centre that is really shown, where the asked one lay beyond an edge. */
+  /** Sets the view's centre to the one that is shown, if the requested one was beyond an edge. */
   recentre(at) {
     this.app.view.x = (at.pane.width / 2 - at.left) / at.width;
     this.app.view.y = (at.pane.height / 2 - at.top) / at.height;
@@ -121,7 +121,7 @@ export class PicturePane {
     ctx.clearRect(0, 0, at.pane.width, at.pane.height);
     const source = this.source(frame);
     if (source) {
-      // Single pixels show once they are large.
+      // Large pixels are drawn sharp.
       ctx.imageSmoothingEnabled = at.scale * canvas.ratio < 3;
       ctx.imageSmoothingQuality = 'high';
       ctx.drawImage(source, at.left, at.top, at.width, at.height);
@@ -204,7 +204,7 @@ export class PicturePane {
     const { app } = this, run = app.runs[this.run];
     const name = app.runs.length > 1 ? `${'AB'[this.run]} ` : '';
     const size = this.pixels ? `${this.pixels[0]} × ${this.pixels[1]}` : '';
-    const what = this.kind === 'picture' ? 'Picture' : this.against ? 'Depth, B against A' : 'Depth';
+    const what = this.kind === 'picture' ? 'Picture' : this.against ? 'Depth, B relative to A' : 'Depth';
     const text = `${name}${what}<span>${app.runs.length > 1 ? escape(run.name) + ' ' : ''}${size}</span>`;
     if (text !== this.captioned) this.caption.innerHTML = this.captioned = text;
     const all = this.kind === 'picture'
@@ -247,7 +247,7 @@ export class PicturePane {
     }
     const { near_m, far_m } = app.colours.scale;
     for (let i = 0; i < 128; i++) stripe(i / 128, (i + 1) / 128, app.colours.scale.colours[2 * i]);
-    // From the far end, which has the unit; what would touch the last is left out.
+    // From the far end, whose label has the unit; labels that would touch the previous one are left out.
     let free = Infinity;
     for (const tick of ticks(near_m, far_m).reverse()) {
       const x = left + app.colours.place(tick) * wide;
@@ -267,7 +267,7 @@ export function labelOf(target) {
   return `${target.id ?? ''}  ${distance.toFixed(1)} m${speed}`.trim();
 }
 
-/** A label above a box, unless it would lie on another one. */
+/** A label above a box, unless it would overlap another one. */
 export function drawLabel(ctx, { target, colour, chosen, x, y }, taken, pane) {
   const text = labelOf(target);
   ctx.font = `${chosen ? 600 : 500} 11px system-ui, sans-serif`;

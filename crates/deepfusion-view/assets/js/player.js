@@ -1,4 +1,4 @@
-// Playing: frames in their time, never one that is not there yet, and the next ones fetched ahead.
+// Playing: frames at their times, never one that is not loaded yet; the next ones are fetched ahead.
 
 const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const AT_ONCE = 4;
@@ -43,7 +43,7 @@ export class Player {
     this.app.touch('time');
   }
 
-  /** The next faster one, and after the fastest of use the slowest. */
+  /** The next faster rate; after the fastest useful one, the slowest. */
   nextRate() {
     this.rate = this.rate >= 4 ? 0.25 : RATES.find(rate => rate > this.rate);
     this.app.touch('time');
@@ -60,20 +60,20 @@ export class Player {
       next = 0;
     }
     if (!app.ready(next)) { this.waited++; this.prefetch(app.frame); return; }
-    // In step with the clock, but no rush after a wait.
+    // In step with the clock, but without catching up after a wait.
     this.due = Math.max(this.due + period, now - period);
     app.show(next);
     this.shownAt.push(now);
     while (this.shownAt[0] < now - 1500) this.shownAt.shift();
   }
 
-  /** Frames per second that are really shown. */
+  /** Frames per second that are actually shown. */
   get measured() {
     const shown = this.shownAt;
     return shown.length > 2 ? 1000 * (shown.length - 1) / (shown.at(-1) - shown[0]) : null;
   }
 
-  /** Fetches what comes next, nearest first, a few at once. */
+  /** Fetches the next frames, the nearest first, a few at once. */
   prefetch(from) {
     const { app } = this;
     for (const [number, run] of app.runs.entries()) {

@@ -5,7 +5,7 @@ import { Cache } from './cache.js';
 import { Depth } from './depth.js';
 import { motion } from './geometry.js';
 
-// A phone has less; both are far below what a page may take.
+// Phones have less memory; both limits are far below what a page may use.
 const FRAME_BYTES = (matchMedia('(pointer: coarse)').matches ? 96 : 320) << 20;
 const TRACK_CHUNK = 64;
 const TRACK_CHUNKS = 24;
@@ -29,7 +29,7 @@ export class Run {
 
   get length() { return this.names.length; }
 
-  /** The frame on show keeps its picture even when the cache has let it go; the one before gives its back then. */
+  /** The frame on screen keeps its picture even after the cache dropped it; the previous frame's is then freed. */
   show(frame) {
     const before = this.shown;
     this.shown = frame;
@@ -42,7 +42,7 @@ export class Run {
     this.failure = index.failure;
     if (index.unchanged) return false;
     const changed = index.names.findIndex((name, i) => name !== this.names[i] || index.revisions[i] !== this.revisions[i]);
-    // Tracks from the first changed frame on are asked for again; till then the old ones are shown.
+    // Tracks from the first changed frame on are requested again; until then the old ones are shown.
     const first = changed >= 0 ? changed : Math.min(this.length, index.names.length);
     if (first < Math.max(this.length, index.names.length)) for (const [key, { value }] of this.chunks.entries) if (Number(key) >= Math.floor(first / TRACK_CHUNK)) value.stale = true;
     Object.assign(this, { version: index.version, names: index.names, revisions: index.revisions, series: index.series });
@@ -53,7 +53,7 @@ export class Run {
     return true;
   }
 
-  /** What distinguishes a frame's present files from earlier ones. */
+  /** Key that distinguishes a frame's current files from earlier ones. */
   key(i) { return i >= 0 && i < this.length ? `${this.names[i]}@${this.revisions[i]}` : ''; }
 
   /** A frame that is loaded; undefined otherwise. */
@@ -61,7 +61,7 @@ export class Run {
 
   has(i) { return this.frames.has(this.key(i)); }
 
-  /** A frame, fetched if need be. It always comes: what cannot be read is listed in its `problems`. */
+  /** A frame, fetched if necessary. This never fails: what cannot be read is listed in its `problems`. */
   load(i) {
     const key = this.key(i);
     if (!key) return Promise.resolve(undefined);
@@ -102,7 +102,7 @@ export class Run {
       frame.worldFromCam = motion(meta.targets?.camera_motion);
     }
     if (depth instanceof api.Problem) {
-      // What is merely absent is among the frame's problems already.
+      // Data that does not exist is already among the frame's problems.
       if (depth.status !== 404) frame.depthProblem = depth.message;
     } else if (depth) {
       try {
@@ -129,7 +129,7 @@ export class Run {
     return frame;
   }
 
-  /** Targets of the frames up to `i`, the newest last, as far as they are loaded; missing ones are requested. */
+  /** Targets of the frames up to `i`, the newest last, as far as loaded; missing ones are requested. */
   history(i, count, arrived) {
     const found = [];
     for (let j = Math.max(0, i - count + 1); j <= i; j++) {
@@ -150,6 +150,6 @@ export class Run {
       for (const frame of tracks) if (frame) frame.world_from_cam = motion(frame.world_from_cam);
       chunks.set(String(chunk), tracks, 1);
       arrived();
-    } catch { /* asked again with the next frame */ } finally { this.chunksComing.delete(version); }
+    } catch { /* requested again with the next frame */ } finally { this.chunksComing.delete(version); }
   }
 }

@@ -4,10 +4,10 @@ import { ofTarget, ofTrack, themeColour } from './colour.js';
 import { BOX_EDGES, FRONT_EDGES, boxCorners, cross, dot, inverseMotion, move, unit } from './geometry.js';
 
 const RINGS = [5, 10, 20, 30, 40, 60, 80];
-/** Frames that a track reaches back. */
+/** How many frames back a track is drawn. */
 export const TRACK_FRAMES = 48;
 
-/** Segments as the line shader takes them: from, to, colour, width. */
+/** Segments for the line shader: from, to, colour, width. */
 export class Lines {
   constructor() {
     this.data = new Float32Array(11 * 1024);
@@ -26,13 +26,13 @@ export class Lines {
   }
 }
 
-/** The frame's ground as {normal, offset, foot, ahead, right}: the one it was found to have, or a level one below the camera. */
+/** The frame's ground as {normal, offset, foot, ahead, right}: the detected one, or a level one below the camera. */
 export function groundOf(frame) {
   const said = frame?.perceived?.ground;
   let normal = [0, -1, 0], offset = 1.6, measured = false;
   if (Array.isArray(said?.normal) && said.normal.length === 3 && Number.isFinite(said.offset_m)) {
     const n = Math.hypot(...said.normal);
-    // Upwards: y points down.
+    // The normal points up; y points down.
     const sign = said.normal[1] > 0 ? -1 : 1;
     if (n > 0) [normal, offset, measured] = [said.normal.map(c => sign * c / n), sign * said.offset_m / n, true];
   } else {
@@ -43,7 +43,7 @@ export function groundOf(frame) {
   return { normal, offset, foot, ahead, right: cross(ahead, normal).map(c => -c), measured };
 }
 
-/** Metres from the camera down to what is before it: the median y of the lowest rows' middle. */
+/** Metres from the camera down to the ground in front of it: the median y in the middle of the lowest rows. */
 function heightBelow(frame) {
   const depth = frame?.depth, camera = frame?.cameraOfDepth;
   if (!depth || !camera) return null;
@@ -61,7 +61,7 @@ function heightBelow(frame) {
 
 const along = (ground, ahead, right) => ground.foot.map((c, i) => c + ahead * ground.ahead[i] + right * ground.right[i]);
 
-/** Rings of equal distance, and their labels' places. */
+/** Rings of equal distance, and the positions of their labels. */
 export function addGround(lines, ground) {
   const colour = themeColour('--grid'), labels = [], wide = 1.05;
   for (const metres of RINGS) {
@@ -116,7 +116,7 @@ function addArrow(lines, from, velocity, colour) {
   for (const sign of [1, -1]) lines.add(to, to.map((c, i) => c - head * way[i] + sign * 0.5 * head * side[i]), colour, 0.95, 2.4);
 }
 
-/** Where the targets and the camera were, in the present camera's axes. Without the camera's motion there are none. */
+/** Past positions of the targets and the camera, in the current camera's axes. Without the camera's motion there are none. */
 export function addTracks(lines, frame, history, { byTrack, light, isChosen }) {
   if (!frame.worldFromCam) return;
   const camFromWorld = inverseMotion(frame.worldFromCam), states = new Map(frame.targets.map(t => [t.id, t]));
@@ -135,7 +135,7 @@ export function addTracks(lines, frame, history, { byTrack, light, isChosen }) {
       if (!before) continue;
       const chosen = now && isChosen(now);
       const colour = chosen ? accent : now && !byTrack ? ofTarget(now, false, light) : ofTrack(id, light);
-      // A jump is another object under an old number: it shows as it is.
+      // A jump means another object under a reused number; it is drawn unchanged.
       lines.add(before, point, colour, (now ? 0.25 : 0.08) + 0.65 * fresh, chosen ? 2.6 : 1.6);
     }
   });

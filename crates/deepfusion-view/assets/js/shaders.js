@@ -14,13 +14,13 @@ uniform float farthest, steepest, tear, pixelScale, pointScale;
 uniform vec4 ground;           // plane: normal, offset
 out vec3 colour;
 uniform bool surface;          // patches between pixels instead of points
-uniform bool fades;            // what is unsure goes over into the background
-uniform vec2 fade;             // sigma / depth where that begins and ends
+uniform bool fades;            // uncertain pixels fade into the background
+uniform vec2 fade;             // sigma / depth at which fading begins and ends
 uniform vec3 background;
 float at(ivec2 p) { return texelFetch(depth, clamp(p, ivec2(0), size - 1), 0).r; }
 float sureness(ivec2 p, float d) { return clamp((fade.y - texelFetch(sigma, p, 0).r / d) / (fade.y - fade.x), 0.0, 1.0); }
 bool shown(float d) { return d > 0.0 && d <= farthest; }
-// How the disparity of a place differs from a neighbour's; nothing where that has none.
+// Difference in disparity from a neighbour; 0 if the neighbour has no depth.
 float fall(float d, ivec2 p) { float n = at(p); return n > 0.0 ? abs(1.0 / n - 1.0 / d) : 0.0; }
 void main() {
   int columns = (size.x + stride - 1) / stride;
@@ -35,7 +35,7 @@ void main() {
     if (any(greaterThanEqual(first + stride, size))) return;
     float a = at(first), b = at(first + ivec2(stride, 0)), c = at(first + ivec2(0, stride)), e = at(first + stride);
     if (!(shown(a) && shown(b) && shown(c) && shown(e))) return;
-    // A patch is torn where its disparity falls more than a plane's would that passes the camera as closely as that.
+    // A patch is torn where its disparity falls more than that of a plane at this distance from the camera would.
     float low = min(min(1.0 / a, 1.0 / b), min(1.0 / c, 1.0 / e)), high = max(max(1.0 / a, 1.0 / b), max(1.0 / c, 1.0 / e));
     if ((high - low) * camera.x > 1.5 * float(stride) * tear) return;
     p = first + stride * ivec2(corner == 1 || corner >= 4 ? 1 : 0, corner == 2 || corner == 3 || corner == 5 ? 1 : 0);
@@ -45,7 +45,7 @@ void main() {
   float d = at(p);
   if (!shown(d)) return;
   if (steepest > 0.0 && !surface) {
-    // Between a near thing and what is behind it a network puts points that are neither: disparity falls to both sides there, faster
+    // Between a near object and its background a network predicts points that belong to neither: there, disparity changes on both sides faster
     // than on any plane that passes the camera at 1 / steepest metres (|gradient| = f / distance).
     vec2 g = vec2(min(fall(d, p - ivec2(1, 0)), fall(d, p + ivec2(1, 0))), min(fall(d, p - ivec2(0, 1)), fall(d, p + ivec2(0, 1)))) * camera.xy;
     if (dot(g, g) > steepest * steepest) return;
@@ -68,7 +68,7 @@ void main() {
   }
   if (fades) {
     colour = mix(background, colour, sureness(p, d));
-    // The remains of an uncertain patch would cover what is behind it: a patch vanishes as a whole.
+    // A patch vanishes as a whole: the rest of an uncertain one would cover what is behind it.
     if (sureness(whole, at(whole)) < 0.15) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   }
 }`,
@@ -78,7 +78,7 @@ in vec3 colour; out vec4 result;
 void main() { result = vec4(colour, 1.0); }`,
 };
 
-/** Lines as wide as asked, as one quad each. */
+/** Lines of any width, as one quad each. */
 export const LINES = {
   vertex: `#version 300 es
 precision highp float;

@@ -3,7 +3,7 @@
 import { css, ofTarget } from './colour.js';
 import { escape } from './picture_pane.js';
 
-const HEAD = '<tr><th>Track</th><th title="From the camera to the box\'s centre">Distance</th><th title="Over ground">Speed</th><th title="Length × width × height">Size, m</th><th>Confidence</th></tr>';
+const HEAD = '<tr><th>Track</th><th title="From the camera to the centre of the box">Distance</th><th title="Over ground">Speed</th><th title="Length × width × height">Size, m</th><th>Confidence</th></tr>';
 
 export class TargetList {
   constructor(app, run) {
@@ -37,7 +37,7 @@ export class TargetList {
         + `<td>${distance(t).toFixed(1)} m</td><td class="${motion}">${speed === null ? '–' : t.moving === false ? 'static' : `${speed.toFixed(1)} m/s`}</td>`
         + `<td>${t.size_m.map(s => s.toFixed(1)).join(' × ')}</td><td>${confidence}</td></tr>`;
     });
-    this.element.innerHTML = this.rows.length ? `<table><thead>${HEAD}</thead><tbody>${rows.join('')}</tbody></table>` : '<div class="empty">No target in sight.</div>';
+    this.element.innerHTML = this.rows.length ? `<table><thead>${HEAD}</thead><tbody>${rows.join('')}</tbody></table>` : '<div class="empty">No targets in this frame.</div>';
   }
 }
 

@@ -1,4 +1,4 @@
-// The time line: a lane for each number that the frames have, what is loaded, and where the playhead is.
+// The time line: a lane for each number of the frames, the loaded frames, and the playhead.
 
 import { css, themeColour } from './colour.js';
 import { fit } from './gestures.js';
@@ -144,7 +144,7 @@ export class Timeline {
     } else {
       ctx.fillStyle = colours.dim;
       ctx.fillText(lane.text, 10, top + tall / 2);
-      // The gutter ends where the lanes begin.
+      // The text must end before the lanes begin.
       ctx.fillStyle = colours.text;
       ctx.textAlign = 'right';
       const free = this.gutter - 14 - ctx.measureText(lane.text).width - 6;

@@ -47,13 +47,13 @@ function drawChart({ column, canvas, readout }, logs) {
   ctx.clearRect(0, 0, width, height);
   const lines = logs.flatMap((log, i) => ['train', 'validation'].map(part => ({
     colour: PALETTE[i % 2], dots: part === 'validation',
-    // A validation makes no step: its step columns are 0.
+    // A validation is not a step: its step columns are 0.
     points: (part === 'validation' && ['learning_rate', 'images_per_second'].includes(column) ? [] : log[part][column] ?? []).map((v, j) => [log[part][log.step_column][j], v]).filter(p => p[0] !== null && p[1] !== null),
   }))).filter(l => l.points.length);
   const all = lines.flatMap(l => l.points);
   if (!all.length) return;
   const xs = all.map(p => p[0]), ys = all.map(p => p[1]).sort((a, b) => a - b);
-  // The first steps may be far off: a hundredth at either end does not stretch the chart.
+  // The first steps may be outliers: a hundredth at either end does not stretch the chart.
   let [low, high] = [ys[Math.floor(0.005 * (ys.length - 1))], ys[Math.ceil(0.99 * (ys.length - 1))]];
   if (!(high > low)) [low, high] = [low - 0.5, high + 0.5];
   const [first, last] = [xs.reduce((a, b) => Math.min(a, b)), xs.reduce((a, b) => Math.max(a, b))];

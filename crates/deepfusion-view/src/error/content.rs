@@ -1,8 +1,8 @@
-//! What folders of results hold, and why a file is not what its name says.
+//! What folders of results contain, and why a file's content does not match its name.
 
 use deepfusion_geometry::NpyHeaderProblem;
 
-/// What a folder of results holds.
+/// What a folder of results contains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FolderKind {
@@ -14,27 +14,27 @@ pub enum FolderKind {
     Training,
 }
 
-/// Why a file is not what its name says.
+/// Why a file's content does not match its name.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ContentProblem {
-    /// A training log is no table: what the parser said.
+    /// A training log is not a table: the parser's error.
     #[error(transparent)]
     Csv(#[from] csv::Error),
     /// A table is not a training log.
     #[error("no columns `step` and `split`: not a training log")]
     NoLog,
-    /// A description is too long to be a frame's.
-    #[error("{bytes} bytes are too many for a frame's description")]
+    /// A JSON file is too long to be a frame's.
+    #[error("too large for a frame's JSON file: {bytes} bytes")]
     TooLong {
-        /// Its length.
+        /// The file's length.
         bytes: u64,
     },
-    /// A description is no JSON, or not all of it is there yet.
+    /// A frame's JSON file is not JSON, or incomplete.
     #[error("{}: {}", no_json(.0), .0)]
     Json(#[from] serde_json::Error),
     /// A depth image is larger than any camera's.
-    #[error("{width}x{height} pixels are more than any camera's image has")]
+    #[error("too large for a camera's image: {width}x{height} pixels")]
     TooLarge {
         /// Its width.
         width: u64,
@@ -48,36 +48,36 @@ pub enum ContentProblem {
 
 fn no_json(error: &serde_json::Error) -> &'static str {
     if error.is_eof() {
-        "half-written, or cut off"
+        "incomplete or truncated"
     } else {
-        "no JSON"
+        "not JSON"
     }
 }
 
-/// Why an NPY array is no depth image.
+/// Why an NPY array is not a depth image.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArrayProblem {
-    /// It does not begin as one.
+    /// The header is not that of an array.
     #[error(transparent)]
     Header(#[from] NpyHeaderProblem),
-    /// It is cut off within its numbers.
+    /// The file ends within its numbers.
     #[error("ends early: {bytes} bytes of {expected} (a {}x{} array)", size.0, size.1)]
     Cut {
         /// The file's length.
         bytes: u64,
         /// The length it should have.
         expected: u64,
-        /// Its width and height.
+        /// Width and height of the array.
         size: (u64, u64),
     },
-    /// Its numbers are of another type; `None` where it does not say which.
-    #[error("depth is `<f4` or `<f8`, not {}", .0.as_deref().unwrap_or("without a type"))]
+    /// The numbers have another type; `None` if the header has none.
+    #[error("expected the type `<f4` or `<f8`, found {}", .0.as_deref().unwrap_or("none"))]
     Type(Option<String>),
-    /// It is stored column by column.
-    #[error("depth is stored row by row (fortran_order False)")]
+    /// The array is stored column by column.
+    #[error("stored column by column, expected row by row (fortran_order False)")]
     ColumnByColumn,
-    /// It has so many dimensions.
-    #[error("depth has two dimensions, this array {0}")]
+    /// The array does not have two dimensions, but this number.
+    #[error("expected two dimensions, found {0}")]
     Dimensions(usize),
 }

@@ -23,7 +23,7 @@ pub(crate) enum FileKind {
     Targets,
 }
 
-/// File name endings, and the kind each means. The plain `.json` is last: it ends others, too.
+/// File name endings and their kinds. The plain `.json` is last, since others end with it, too.
 const ENDINGS: [(&str, FileKind); 8] = [
     ("_depth.png", FileKind::DepthPng),
     ("_depth.npy", FileKind::DepthArray),
@@ -35,7 +35,7 @@ const ENDINGS: [(&str, FileKind); 8] = [
     (".json", FileKind::Sidecar),
 ];
 
-/// The frame and kind that a file's name stands for.
+/// The frame's name and the kind of a file, from its name.
 pub(super) fn frame_and_kind(file: &str) -> Option<(&str, FileKind)> {
     // Temporary files begin with a dot; a shard's manifest is no sidecar.
     if file.starts_with('.') || file.ends_with(".manifest.json") {
@@ -47,12 +47,12 @@ pub(super) fn frame_and_kind(file: &str) -> Option<(&str, FileKind)> {
     (!name.is_empty()).then_some((name, kind))
 }
 
-/// A file of a frame: its name, and what shows that it changed.
+/// A file of a frame: its name, and a mark that changes when the file does.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct FrameFile {
     /// Its name in the folder.
     pub file: String,
-    /// Bytes and time of change.
+    /// Length in bytes and modification time in nanoseconds.
     mark: (u64, u128),
 }
 
@@ -70,10 +70,10 @@ impl FrameFile {
     }
 }
 
-/// A frame: which of its files are there, and what was learnt from the small ones.
+/// A frame: its existing files, and a summary of the small ones.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Entry {
-    /// What its files' names begin with.
+    /// The prefix of its files' names.
     pub name: String,
     pub sidecar: Option<FrameFile>,
     pub depth_array: Option<FrameFile>,
@@ -93,7 +93,7 @@ impl Entry {
         }
     }
 
-    /// What may be its depth, the best first: an array's metres are exact.
+    /// The files that may be its depth, the most exact first: an array's metres are not rounded.
     pub(crate) fn depths(&self) -> impl Iterator<Item = &FrameFile> {
         [&self.depth_array, &self.depth_png].into_iter().flatten()
     }
@@ -103,7 +103,7 @@ impl Entry {
         self.depths().next().is_some()
     }
 
-    /// Takes in a file. Of two of a kind the first in the order of names stays.
+    /// Adds a file. Of two files of a kind, the first by name is kept.
     pub(crate) fn add(&mut self, kind: FileKind, file: FrameFile) {
         let place = match kind {
             FileKind::Sidecar => &mut self.sidecar,
@@ -130,7 +130,7 @@ impl Entry {
             &self.targets,
         ];
         files.hash(&mut hash);
-        // As many bits as a JavaScript number holds.
+        // JavaScript's numbers hold 53 bits exactly.
         hash.finish() >> 12
     }
 }

@@ -16,8 +16,8 @@ use super::problem::FrameProblem;
 use super::small_files::SmallFiles;
 use crate::{Error, Result};
 
-/// Fields of the sidecar that the page shows as they are; `scale_trusted` is older programs', which had neither of the two
-/// before it.
+/// Fields of the sidecar that the page shows unchanged. `scale_trusted` is from older versions, which had neither `camera_known` nor
+/// `scale`.
 const PASSED_ON: [&str; 12] = [
     "unit",
     "model",
@@ -33,11 +33,11 @@ const PASSED_ON: [&str; 12] = [
     "image",
 ];
 
-/// A frame as the page gets it: the camera, which parts there are, the targets, and what is wrong with any of them. Everything but
+/// A frame as sent to the page: the camera, depth and picture, the targets, and the problems with any of them. Everything but
 /// `name` may be missing.
 #[derive(Debug, Serialize)]
 pub(crate) struct FrameDetails {
-    /// Its file's name.
+    /// Name of the file of depth.
     depth: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub intrinsics: Option<Intrinsics>,
@@ -47,14 +47,14 @@ pub(crate) struct FrameDetails {
     #[serde(serialize_with = "as_sentences")]
     pub problems: Vec<FrameProblem>,
     revision: u64,
-    /// As their file has them.
+    /// The content of the targets' file.
     targets: Option<Value>,
-    /// Of the sidecar, as it has them: those of [`PASSED_ON`] that are there.
+    /// The sidecar's values of [`PASSED_ON`], as far as they exist.
     #[serde(flatten)]
     passed_on: BTreeMap<&'static str, Value>,
 }
 
-/// Where a frame's picture lies, and its size.
+/// Path and size of a frame's picture.
 #[derive(Debug, Serialize)]
 struct ShownPicture {
     path: String,
@@ -66,7 +66,7 @@ fn as_sentences<S: Serializer>(problems: &[FrameProblem], out: S) -> Result<S::O
     out.collect_seq(problems.iter().map(FrameProblem::to_string))
 }
 
-/// What there is of a frame.
+/// Everything that is known of a frame.
 pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
     let files = SmallFiles::read(folder, entry);
     let depth = files.depth(entry);
@@ -113,7 +113,7 @@ pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
         Err(none) => problems.push(none),
     }
     match depth.map(|d| folder.join(&d.file)) {
-        // An array's header is read with its numbers; the page compares the sizes once more.
+        // The header of an array is not read here; the page compares the sizes again.
         Some(path) if path.extension().is_some_and(|e| e == "png") => match image_size(&path) {
             Ok(found) => {
                 if let Some(expected) = said_size.filter(|said| *said != found) {
@@ -141,17 +141,17 @@ pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
     }
 }
 
-/// A frame's targets, short.
+/// A short form of a frame's targets.
 #[derive(Debug, Serialize)]
 pub(crate) struct Track {
     name: String,
-    /// Id, and centre in the camera, in metres.
+    /// Track id, and centre in camera axes, in metres.
     targets: Vec<(u64, [f64; 3])>,
     /// 3×4, row by row.
     world_from_cam: Option<[f64; 12]>,
 }
 
-/// A frame's targets; `None` where there are none.
+/// A frame's targets; `None` without a readable file of targets.
 pub(crate) fn targets_of(folder: &Path, entry: &Entry) -> Option<Track> {
     let frame = SmallFiles::read(folder, entry).targets?.record;
     Some(Track {
@@ -163,9 +163,9 @@ pub(crate) fn targets_of(folder: &Path, entry: &Entry) -> Option<Track> {
 
 /// A frame's picture.
 pub(crate) struct Picture {
-    /// Where it lies.
+    /// Path of the file.
     pub path: PathBuf,
-    /// PNG or JPEG.
+    /// Media type: PNG or JPEG.
     pub content_type: &'static str,
     /// Width and height.
     pub size: (u32, u32),
@@ -185,11 +185,12 @@ fn picture(
     sidecar: Option<&PredictionRecord>,
 ) -> Result<Picture, FrameProblem> {
     let named = sidecar.and_then(|s| s.image.clone());
-    // As it was given to `predict`, whose folder this may still be; or beside the results, which were moved together.
+    // The path as it was given to `predict`, from the current folder, if that is still the same, or from the results' folder, if both were
+    // moved together.
     let undistorted = sidecar.is_some_and(|s| s.undistorted);
     let mut places: Vec<PathBuf> = named
         .iter()
-        // That one is bent as the lens saw it, and depth is not.
+        // That picture still has the lens's distortion, and depth has not.
         .filter(|_| !undistorted)
         .flat_map(|p| [p.clone(), folder.join(p)])
         .collect();
@@ -215,7 +216,7 @@ fn picture(
                     changed: said.is_some() && said != bytes,
                 });
             }
-            // A video or a bag is no picture: the one beside the results was taken out of it.
+            // A video or a bag is not a picture; its frame may be beside the results.
             Ok(None) => {}
             Err(e) => problem = Some(problem.unwrap_or(e)),
         }
@@ -234,7 +235,7 @@ fn picture(
 /// A picture's type, from its first bytes; `None` if there is no file or it is not a picture. Only accepted files are ever sent,
 /// so that a sidecar cannot expose any other file.
 fn picture_type(path: &Path) -> Result<Option<(&'static str, (u32, u32))>> {
-    // Not a pipe or a device: those may block.
+    // Pipes and devices are not opened: they may block.
     if !std::fs::metadata(path).is_ok_and(|m| m.is_file()) {
         return Ok(None);
     }

@@ -1,4 +1,4 @@
-//! The list of frames as the page gets it.
+//! The list of frames as sent to the page.
 
 use deepfusion_records::ScaleState;
 use serde::Serialize;
@@ -10,9 +10,9 @@ use super::summary::Summary;
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Index {
-    /// Its list is this one.
+    /// The page's list is current.
     Known { unchanged: bool, version: u64 },
-    /// Another list.
+    /// The current list, which the page does not have.
     New(Box<Columns>),
 }
 
@@ -21,7 +21,7 @@ pub(crate) enum Index {
 pub(crate) struct Columns {
     /// Why the folder could not be listed again.
     failure: Option<String>,
-    /// 1 where there is depth, else 0.
+    /// 1 if the frame has depth, else 0.
     has_depth: Vec<u8>,
     has_sigma: Vec<u8>,
     names: Vec<String>,
@@ -32,7 +32,7 @@ pub(crate) struct Columns {
     version: u64,
 }
 
-/// The numbers of the time line; none where a frame has not said any, or has not been read yet.
+/// The numbers of the time line; `None` if a frame lacks one or has not been read yet.
 #[derive(Debug, Serialize)]
 struct Series {
     far_m: Vec<Option<f64>>,
@@ -49,7 +49,7 @@ struct Series {
 }
 
 impl Index {
-    /// Only a note where the page's `known` list is current.
+    /// [`Index::Known`] if the page's `known` list is current.
     pub(super) fn of(
         entries: &[Entry],
         version: u64,
@@ -67,7 +67,7 @@ impl Index {
         };
         Self::New(Box::new(Columns {
             failure,
-            // Until the sidecar has been read, which may not stand for a file.
+            // Before the sidecar has been read, any file of depth counts.
             has_depth: flags(|e| {
                 let summary = e.summary.as_ref();
                 summary.map_or(e.may_have_depth(), |s| s.has_depth)
@@ -104,7 +104,7 @@ impl Series {
     }
 }
 
-/// What each frame's small files say.
+/// One value of each frame's summary.
 fn column<T>(entries: &[Entry], of: fn(&Summary) -> Option<T>) -> Vec<Option<T>> {
     let summaries = entries.iter().map(|e| e.summary.as_ref());
     summaries.map(|summary| summary.and_then(of)).collect()

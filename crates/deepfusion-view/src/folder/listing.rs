@@ -1,4 +1,4 @@
-//! The list of frames, kept in step with the folder.
+//! The list of frames, kept up to date with the folder.
 
 use std::collections::{HashMap, hash_map};
 use std::io;
@@ -10,14 +10,14 @@ use super::index::Index;
 use super::order::natural;
 use super::summary::Summary;
 
-/// Files that are written in place change without the folder noticing; so the folder is listed again after this time in any case.
+/// The folder is listed again after this time in any case: writing into an existing file does not change the folder's modification time.
 const RELIST_AFTER: Duration = Duration::from_secs(5);
-/// A folder that takes long to list and changes all the time, as while it is written to, is listed for one part in so many: a hundred thousand frames
-/// take seconds, and every other answer waits for them.
+/// A folder that takes long to list and changes all the time, as while it is written to, is listed during at most one part in this many of the
+/// time: listing a hundred thousand frames takes seconds, and every other answer waits for it.
 const LISTED_SHARE: u32 = 10;
-/// What takes as long.
+/// A listing that takes this long counts as long.
 const LONG: Duration = Duration::from_millis(500);
-/// How long an answer may be held up by reading small files; the rest is read for the next one.
+/// How long reading small files may delay an answer; the rest is read for the next one.
 const READING_TIME: Duration = Duration::from_millis(150);
 
 /// The frames of a folder.
@@ -31,19 +31,19 @@ pub(super) struct Listing {
     last: Option<LastListing>,
 }
 
-/// How the folder was listed last.
+/// The last listing of the folder.
 #[derive(Debug, Clone, Copy)]
 struct LastListing {
-    /// When it was done.
+    /// When it finished.
     done: Instant,
     took: Duration,
-    /// The time of change that the folder had.
+    /// The folder's modification time then.
     changed: SystemTime,
 }
 
 impl LastListing {
-    /// Whether the list still stands for a folder with this time of change.
-    fn stands(self, changed: SystemTime) -> bool {
+    /// Whether the list is still recent enough for a folder with this modification time.
+    fn is_current(self, changed: SystemTime) -> bool {
         let age = self.done.elapsed();
         let unchanged = self.changed == changed && age < RELIST_AFTER;
         unchanged || (self.took >= LONG && age < LISTED_SHARE * self.took)
@@ -87,7 +87,7 @@ impl Listing {
         let changed = std::fs::metadata(&self.folder)?
             .modified()
             .unwrap_or(SystemTime::UNIX_EPOCH);
-        if self.last.is_some_and(|last| last.stands(changed)) {
+        if self.last.is_some_and(|last| last.is_current(changed)) {
             return Ok(());
         }
         let begun = Instant::now();
@@ -121,7 +121,7 @@ impl Listing {
         Ok(())
     }
 
-    /// Takes over what was found; what was learnt of frames that did not change stays.
+    /// Replaces the list by what was found, and keeps the summaries of frames that did not change.
     fn replace(&mut self, found: HashMap<String, Entry>) {
         let mut entries: Vec<Entry> = found.into_values().collect();
         for entry in &mut entries {
@@ -129,7 +129,7 @@ impl Listing {
                 .entry(&entry.name)
                 .filter(|known| known.revision() == entry.revision());
             entry.summary = known.and_then(|known| known.summary.clone());
-            // A frame has depth or targets, or a sidecar that says so: other JSON files may lie there, too.
+            // Without depth or targets, only the content shows whether a JSON file is a frame's sidecar.
             if !entry.may_have_depth() && entry.targets.is_none() && entry.summary.is_none() {
                 entry.summary = Some(Summary::read(&self.folder, entry));
             }
@@ -148,7 +148,7 @@ impl Listing {
         self.entries = entries;
     }
 
-    /// Reads the small files of frames that are not known yet, for a while.
+    /// Reads the small files of new frames, for a limited time.
     pub(super) fn summarise(&mut self) {
         let begin = Instant::now();
         for entry in self.entries.iter_mut().filter(|e| e.summary.is_none()) {
@@ -171,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_list_that_took_long_stands_for_longer() {
+    fn a_list_that_took_long_stays_current_for_longer() {
         let done = Instant::now();
         let changed = SystemTime::UNIX_EPOCH;
         let later = changed + Duration::from_secs(1);
@@ -180,12 +180,12 @@ mod tests {
             took: LONG / 2,
             changed,
         };
-        assert!(quick.stands(changed));
-        assert!(!quick.stands(later));
+        assert!(quick.is_current(changed));
+        assert!(!quick.is_current(later));
         let slow = LastListing {
             took: Duration::from_secs(60),
             ..quick
         };
-        assert!(slow.stands(later));
+        assert!(slow.is_current(later));
     }
 }

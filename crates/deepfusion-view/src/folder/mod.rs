@@ -70,19 +70,19 @@ impl Folder {
         })
     }
 
-    /// The folder.
+    /// The folder's path.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Number of frames when it was last listed; 0 for a training run.
+    /// Number of frames when the folder was last listed; 0 for a training run.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.listing().len()
     }
 
-    /// Whether it is a training run without predictions.
+    /// Whether the folder is a training run without predictions.
     #[must_use]
     pub fn is_training_run(&self) -> bool {
         self.kind == FolderKind::Training
@@ -92,7 +92,7 @@ impl Folder {
         self.kind
     }
 
-    /// What a person calls it: the last part of its path.
+    /// The folder's name: the last part of its path.
     pub(crate) fn name(&self) -> String {
         let full = std::fs::canonicalize(&self.path).unwrap_or_else(|_| self.path.clone());
         full.file_name().map_or_else(
@@ -109,7 +109,7 @@ impl Folder {
         listing.index(known, failure)
     }
 
-    /// A frame that the listing holds.
+    /// The frame of this name, if it was listed.
     pub(crate) fn entry(&self, name: &str) -> Option<Entry> {
         self.listing().entry(name).cloned()
     }
@@ -120,7 +120,7 @@ impl Folder {
     }
 
     fn listing(&self) -> MutexGuard<'_, Listing> {
-        // A listing is whole between its methods: a panic elsewhere leaves nothing half done.
+        // No method leaves a listing half changed, so it is valid after a panic elsewhere.
         self.listing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

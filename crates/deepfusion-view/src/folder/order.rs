@@ -2,12 +2,12 @@
 
 use std::cmp::Ordering;
 
-/// Compares names, runs of digits by their value.
+/// Compares names, with runs of digits compared by value.
 pub(super) fn natural(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a.as_bytes(), b.as_bytes());
     loop {
         let (x, y) = match (left.first(), right.first()) {
-            // Names that differ in leading zeros alone: any order, but always the same.
+            // Names that differ only in leading zeros: any order, but always the same.
             (None, None) => return a.cmp(b),
             (None, _) => return Ordering::Less,
             (_, None) => return Ordering::Greater,
@@ -26,7 +26,7 @@ pub(super) fn natural(a: &str, b: &str) -> Ordering {
     }
 }
 
-/// Takes the digits at the begin, and gives them without leading zeros.
+/// Removes the digits at the beginning, and returns them without leading zeros.
 fn number<'a>(text: &mut &'a [u8]) -> &'a [u8] {
     let end = text
         .iter()
@@ -44,7 +44,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn people_count() {
+    fn numbers_are_ordered_by_value() {
         let mut names = [
             "f10",
             "f2",
@@ -73,7 +73,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_is_an_order(a in "[a0-9]{0,5}", b in "[a0-9]{0,5}", c in "[a0-9]{0,5}") {
+        fn natural_order_is_total(a in "[a0-9]{0,5}", b in "[a0-9]{0,5}", c in "[a0-9]{0,5}") {
             prop_assert_eq!(natural(&a, &b), natural(&b, &a).reverse());
             prop_assert_eq!(natural(&a, &b) == Ordering::Equal, a == b);
             if natural(&a, &b).is_le() && natural(&b, &c).is_le() {

@@ -1,36 +1,36 @@
-//! What is wrong with a frame.
+//! Problems with a frame.
 
 use std::path::PathBuf;
 
 use deepfusion_geometry::ImplausibleCamera;
 use deepfusion_hint::count_of;
 
-/// What is wrong with a frame, of which the rest is shown all the same.
+/// A problem with a frame. The rest of the frame is still shown.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameProblem {
-    /// A file cannot be read: the error that this gave, with the file's path.
+    /// A file cannot be read: the error's text, with the file's path.
     #[error("{0}")]
     Unreadable(String),
-    /// A small file is not as `predict` and `perceive` write it.
-    #[error("{file}: not as this program writes it: {why}")]
+    /// A small file does not have the format in which `predict` and `perceive` write it.
+    #[error("{file}: not written by this program: {why}")]
     Foreign {
-        /// Its name.
+        /// The file's name.
         file: String,
-        /// What the parser said.
+        /// The parser's error.
         why: String,
     },
-    /// The targets' file is one of something else.
+    /// The targets' file contains something else.
     #[error("the targets' file has no list of targets")]
     NoTargets,
-    /// Targets of which nothing can be drawn.
+    /// Targets that cannot be drawn.
     #[error(
-        "{undrawable} of {} {} no place or size",
+        "{undrawable} of {} {} no position or size",
         count_of(*targets, "target"),
         if *undrawable == 1 { "has" } else { "have" }
     )]
     Undrawable {
-        /// How many.
+        /// How many of them cannot be drawn.
         undrawable: usize,
         /// How many targets there are.
         targets: usize,
@@ -41,47 +41,47 @@ pub enum FrameProblem {
         /// The frame's name.
         frame: String,
     },
-    /// The sidecar says nothing of the camera.
+    /// The sidecar has no camera.
     #[error("the camera is unknown: no cloud, no boxes on the picture")]
     NoCamera,
-    /// The sidecar's camera is none.
-    #[error("the sidecar's camera cannot be: {0}")]
+    /// The sidecar's camera is impossible.
+    #[error("the sidecar's camera is impossible: {0}")]
     Camera(ImplausibleCamera),
-    /// The sidecar says nothing of the image's size.
-    #[error("the sidecar does not say the image's size")]
+    /// The sidecar lacks the image's size.
+    #[error("the sidecar lacks the image's size")]
     NoSize,
-    /// Nothing says which picture it was.
-    #[error("no picture is known")]
+    /// The frame has no sidecar or other file that names its picture.
+    #[error("the picture is unknown")]
     NoPicture,
-    /// The picture was there when depth was made from it.
-    #[error("{}: the picture is not there any more", .0.display())]
+    /// The picture was moved or removed since depth was predicted from it.
+    #[error("{}: the picture no longer exists", .0.display())]
     PictureGone(PathBuf),
-    /// A video or a bag, which holds the picture, is named.
-    #[error("{}: one picture among others, and none is kept beside the results", .0.display())]
+    /// The picture is a frame of a video or a bag, and was not saved by itself.
+    #[error("{}: the picture is inside this file and was not saved beside the results", .0.display())]
     PictureAmongOthers(PathBuf),
-    /// The picture has the lens's distortion, which depth, cloud and boxes have not.
-    #[error("{}: not shown, as depth is of the picture without the lens's distortion, and that was not saved", .0.display())]
+    /// The picture has the lens's distortion, while depth, cloud and boxes do not.
+    #[error("{}: not shown: depth is of the undistorted picture, which was not saved", .0.display())]
     Distorted(PathBuf),
-    /// The picture has another size than the sidecar says.
+    /// The picture's size differs from the sidecar's.
     #[error("the picture is {}, the sidecar says {}", by(*found), by(*expected))]
     PictureSize {
-        /// Its width and height.
+        /// Width and height of the picture.
         found: (u32, u32),
-        /// The sidecar's.
+        /// Width and height in the sidecar.
         expected: (u32, u32),
     },
-    /// The picture is another one than depth was made from.
-    #[error("the picture has changed since its depth was made")]
+    /// The picture is not the one that depth was predicted from.
+    #[error("the picture has changed since its depth was predicted")]
     PictureChanged,
     /// There is no depth.
-    #[error("no depth was saved, neither as depth-png nor as npy")]
+    #[error("no depth was saved (depth-png or npy)")]
     NoDepth,
-    /// Depth has another size than the sidecar says.
+    /// Depth's size differs from the sidecar's.
     #[error("depth is {}, the sidecar says {}", by(*found), by(*expected))]
     DepthSize {
-        /// Its width and height.
+        /// Width and height of depth.
         found: (u32, u32),
-        /// The sidecar's.
+        /// Width and height in the sidecar.
         expected: (u32, u32),
     },
 }
@@ -95,28 +95,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_wrong_with_small_files() {
-        for (problem, said) in [
+    fn problems_of_small_files() {
+        for (problem, text) in [
             (
                 FrameProblem::Foreign {
                     file: "a.json".into(),
                     why: "no size".into(),
                 },
-                "a.json: not as this program writes it: no size",
+                "a.json: not written by this program: no size",
             ),
             (
                 FrameProblem::Undrawable {
                     undrawable: 2,
                     targets: 5,
                 },
-                "2 of 5 targets have no place or size",
+                "2 of 5 targets have no position or size",
             ),
             (
                 FrameProblem::Undrawable {
                     undrawable: 1,
                     targets: 1,
                 },
-                "1 of 1 target has no place or size",
+                "1 of 1 target has no position or size",
             ),
             (
                 FrameProblem::NoSidecar {
@@ -129,24 +129,24 @@ mod tests {
                     name: "fx",
                     value: 0.0,
                 }),
-                "the sidecar's camera cannot be: fx is 0, expected a focal length above 0",
+                "the sidecar's camera is impossible: fx is 0, expected a focal length above 0",
             ),
         ] {
-            assert_eq!(problem.to_string(), said);
+            assert_eq!(problem.to_string(), text);
         }
     }
 
     #[test]
-    fn what_is_wrong_with_pictures_and_depth() {
+    fn problems_of_pictures_and_depth() {
         let (found, expected) = ((96, 48), (200, 100));
-        for (problem, said) in [
+        for (problem, text) in [
             (
                 FrameProblem::PictureGone("drive/1.png".into()),
-                "drive/1.png: the picture is not there any more",
+                "drive/1.png: the picture no longer exists",
             ),
             (
                 FrameProblem::PictureAmongOthers("drive.mp4".into()),
-                "drive.mp4: one picture among others, and none is kept beside the results",
+                "drive.mp4: the picture is inside this file and was not saved beside the results",
             ),
             (
                 FrameProblem::PictureSize { found, expected },
@@ -157,7 +157,7 @@ mod tests {
                 "depth is 96x48, the sidecar says 200x100",
             ),
         ] {
-            assert_eq!(problem.to_string(), said);
+            assert_eq!(problem.to_string(), text);
         }
     }
 }

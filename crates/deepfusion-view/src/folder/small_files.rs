@@ -10,28 +10,28 @@ use super::entry::{Entry, FrameFile};
 use super::problem::FrameProblem;
 use crate::{ContentProblem, Error, Result};
 
-/// No sidecar or list of targets is as large; what is, is another program's file.
+/// Sidecars and lists of targets are smaller; a larger file is another program's.
 const MOST_JSON_BYTES: u64 = 16 << 20;
 
-/// What the small files of a frame say, and what is wrong with them.
+/// The content of a frame's small files, and the problems with them.
 #[derive(Default)]
 pub(crate) struct SmallFiles {
     pub sidecar: Option<ReadFile<PredictionRecord>>,
     /// Without the targets that cannot be drawn.
     pub targets: Option<ReadFile<FrameRecord>>,
     pub problems: Vec<FrameProblem>,
-    /// Whether a file is not whole: a frame that comes.
+    /// Whether a file is incomplete, since the frame is still being written.
     pub unfinished: bool,
 }
 
-/// A file as it stands, for the page, and what it says.
+/// A file's JSON, for the page, and its typed content.
 pub(crate) struct ReadFile<T> {
     pub json: Value,
     pub record: T,
 }
 
 impl SmallFiles {
-    /// Reads what there is of them.
+    /// Reads those that exist.
     pub(crate) fn read(folder: &Path, entry: &Entry) -> Self {
         let mut files = Self::default();
         files.sidecar = files.json(folder, entry.sidecar.as_ref()).map(|json| {
@@ -51,13 +51,13 @@ impl SmallFiles {
         entry.depths().find(|file| self.stand_for(file))
     }
 
-    /// The file of its depth's standard deviation.
+    /// The file of the standard deviation of a frame's depth.
     pub(crate) fn sigma<'a>(&self, entry: &'a Entry) -> Option<&'a FrameFile> {
         entry.sigma.as_ref().filter(|file| self.stand_for(file))
     }
 
-    /// Whether the sidecar, where there is one, stands for an output: what it does not name was made before it, by another camera perhaps. Sidecars of other
-    /// programs name no outputs.
+    /// Whether an output belongs to the sidecar, if there is one. An output that the sidecar does not name is older, perhaps of another camera.
+    /// Sidecars of other programs name no outputs; then all belong.
     fn stand_for(&self, file: &FrameFile) -> bool {
         let sidecar = self.sidecar.as_ref();
         let named = sidecar.and_then(|s| s.json.get("files")?.as_array());
@@ -77,7 +77,7 @@ impl SmallFiles {
             .ok()
     }
 
-    /// What a file says; nothing where it is none of ours.
+    /// A file's typed content; the default if another program wrote it.
     fn record<'de, T: Deserialize<'de> + Default>(
         &mut self,
         file: Option<&FrameFile>,
@@ -91,7 +91,7 @@ impl SmallFiles {
         })
     }
 
-    /// Takes out the targets that have no place or size: nothing of them can be drawn.
+    /// Removes targets without position or size, which cannot be drawn.
     fn without_undrawable(&mut self, frame: &mut Value) {
         let Some(list) = frame.get_mut("targets").and_then(Value::as_array_mut) else {
             self.problems.push(FrameProblem::NoTargets);
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_ours_says_nothing_and_is_named() {
+    fn another_programs_file_is_ignored_and_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.json");
         std::fs::write(&path, r#"{"image": "x.png", "size": "large"}"#).unwrap();

@@ -8,10 +8,10 @@ use super::entry::Entry;
 use super::problem::FrameProblem;
 use super::small_files::SmallFiles;
 
-/// What the time line says about a frame. Numbers are `None` where they are absent.
+/// What the time line shows of a frame. Absent numbers are `None`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Summary {
-    /// Whether this is a frame at all: other JSON files may lie in the folder.
+    /// Whether this is a frame at all: the folder may contain other JSON files.
     pub is_frame: bool,
     pub has_depth: bool,
     pub has_sigma: bool,
@@ -29,11 +29,11 @@ pub(crate) struct Summary {
 }
 
 impl Summary {
-    /// Reads the frame's sidecar and targets. What cannot be read becomes [`Summary::problem`].
+    /// Reads the frame's sidecar and targets. Failures go to [`Summary::problem`].
     pub(crate) fn read(folder: &Path, entry: &Entry) -> Self {
         let files = SmallFiles::read(folder, entry);
         let mut summary = Self {
-            // A sidecar that is being written is a frame that comes.
+            // A sidecar that is still being written counts as a frame.
             is_frame: entry.may_have_depth() || entry.targets.is_some() || files.unfinished,
             has_depth: files.depth(entry).is_some(),
             has_sigma: files.sigma(entry).is_some(),
@@ -64,7 +64,7 @@ impl Summary {
         self.add_scale(frame.scale_monitor);
     }
 
-    /// What `predict` and `perceive` say of the metres.
+    /// Adds the scale monitor's reading.
     fn add_scale(&mut self, monitor: Option<ScaleRecord>) {
         if let Some(monitor) = monitor {
             self.scale_ratio = monitor.reading.ratio;
@@ -73,7 +73,7 @@ impl Summary {
     }
 }
 
-/// A number as its file has it: 5.9, not 5.900000095 as the f32 next to it is.
+/// A number as written in its file: 5.9, and not 5.900000095, the value of the nearest f32.
 fn as_written(number: f32) -> f64 {
     number.to_string().parse().unwrap_or(f64::from(number))
 }

@@ -7,12 +7,12 @@ use std::time::Duration;
 use super::request::Refusal;
 use super::{Request, Response};
 
-/// A browser's head takes a few hundred bytes.
+/// Longest head of a request; a browser's takes a few hundred bytes.
 const MOST_HEAD_BYTES: usize = 16 << 10;
-/// How long a client may stay silent; a page asks every two seconds.
+/// How long a client may stay silent; the page sends a request every two seconds.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Answers a client's requests until it goes or is silent for long. What fails here is the client's connection alone.
+/// Answers a client's requests until it disconnects or is silent for too long. An error concerns only this client's connection.
 pub(crate) fn serve(
     mut stream: TcpStream,
     answer: &dyn Fn(&Request) -> Response,
@@ -27,7 +27,7 @@ pub(crate) fn serve(
             Some(Ok(request)) => request,
             Some(Err(refusal)) => {
                 refusal.write(&mut stream, false, false)?;
-                return hear_out(&mut stream);
+                return drain(&mut stream);
             }
         };
         answer(&request).write(&mut stream, request.head_only, request.keep_alive)?;
@@ -37,15 +37,15 @@ pub(crate) fn serve(
     }
 }
 
-/// Takes what a refused client still sends, for a moment: closing before would take the answer from it.
-fn hear_out(stream: &mut TcpStream) -> io::Result<()> {
+/// Reads what a refused client still sends, for a moment: closing the connection earlier would discard the answer.
+fn drain(stream: &mut TcpStream) -> io::Result<()> {
     stream.shutdown(std::net::Shutdown::Write)?;
     stream.set_read_timeout(Some(Duration::from_secs(1)))?;
     io::copy(&mut stream.take(1 << 20), &mut io::sink())?;
     Ok(())
 }
 
-/// The next request; `None` where the client has gone.
+/// The next request; `None` if the client has disconnected.
 fn next(
     stream: &mut TcpStream,
     waiting: &mut Vec<u8>,
@@ -66,11 +66,7 @@ fn next(
             }
             Ok(None) => {}
             Err(Refusal::Malformed) => {
-                return Ok(Some(Err(Response::problem(
-                    400,
-                    "no request that is understood",
-                    None,
-                ))));
+                return Ok(Some(Err(Response::problem(400, "malformed request", None))));
             }
             Err(Refusal::Method) => {
                 return Ok(Some(Err(Response::problem(

@@ -1,6 +1,6 @@
 //! A request's head.
 
-/// What a client asks for.
+/// A client's request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Request {
     /// Whether the body is left out (HEAD).
@@ -15,12 +15,12 @@ pub(crate) struct Request {
     pub keep_alive: bool,
 }
 
-/// Why a head is no request that is answered.
+/// Why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Refusal {
-    /// No HTTP, or a path that cannot be decoded.
+    /// Not HTTP, or a path that cannot be decoded.
     Malformed,
-    /// Another method than GET and HEAD, or a body.
+    /// A method other than GET and HEAD, or a body.
     Method,
 }
 
@@ -92,7 +92,7 @@ fn without_port(host: &str) -> &str {
     }
 }
 
-/// `%2e` and the like; `None` for a percent sign without two digits, or bytes that are no UTF-8.
+/// Decodes `%2e` and the like; `None` for a percent sign without two digits, or bytes that are not UTF-8.
 fn percent_decoded(text: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.bytes();
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn hosts_lose_their_port_alone() {
+    fn hosts_lose_only_their_port() {
         for (host, name) in [
             ("[::1]:80", "[::1]"),
             ("[::1]", "[::1]"),
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_answered_is_distinguished() {
+    fn refused_requests_are_distinguished() {
         assert_eq!(parsed("GET / HTTP/1.1\r\nHo"), Ok(None));
         assert_eq!(parsed("POST / HTTP/1.1\r\n\r\n"), Err(Refusal::Method));
         assert_eq!(

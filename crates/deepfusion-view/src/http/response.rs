@@ -13,14 +13,14 @@ pub(crate) struct Response {
     pub body: Cow<'static, [u8]>,
 }
 
-/// What the page shows of a failure.
+/// A failure as sent to the page.
 #[derive(Debug, Serialize)]
 struct Problem<'a> {
     error: &'a str,
     hint: Option<&'a str>,
 }
 
-/// The page talks to its own server alone, and runs no script but the server's files.
+/// The page connects only to its own server, and runs only the server's scripts.
 const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; object-src 'none'; \
                       base-uri 'none'; frame-ancestors 'none'";
 
@@ -71,7 +71,7 @@ impl Response {
         }
     }
 
-    /// Writes head and body; the body's length alone for HEAD.
+    /// Writes head and body; for HEAD only the head, with the body's length.
     pub(crate) fn write(
         &self,
         out: &mut impl Write,

@@ -1,4 +1,4 @@
-//! One frame.
+//! Logs one frame for the rerun viewer.
 
 use std::io::Write;
 use std::path::Path;
@@ -24,7 +24,7 @@ pub(super) struct FrameLogger {
 }
 
 impl FrameLogger {
-    /// Logs what there is of a frame, and returns what is wrong with it.
+    /// Logs a frame's data and returns its problems.
     pub(super) fn log<W: Write>(
         &mut self,
         recording: &mut Recording<W>,
@@ -96,7 +96,7 @@ fn time_of(place: usize, time_s: Option<f64>) -> TimePoint {
     }
 }
 
-/// `world_from_cam`, row by row, as the viewer takes it: column by column. Where it is not known the camera is the world.
+/// Converts `world_from_cam` from rows to the columns that the viewer expects. If it is unknown, the world's axes are the camera's.
 fn transform(world_from_cam: Option<[f64; 12]>) -> Transform3D {
     const HERE: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let m = world_from_cam.unwrap_or(HERE).map(|x| x as f32);
@@ -104,7 +104,7 @@ fn transform(world_from_cam: Option<[f64; 12]>) -> Transform3D {
     Transform3D::from_translation_mat3x3([m[3], m[7], m[11]], columns)
 }
 
-/// The viewer's cloud takes pixels at integers too: (u − cx)/fx, nothing to be shifted by half a pixel.
+/// In the viewer's cloud, pixel centres are integers as well, (u − cx)/fx, so nothing is shifted by half a pixel.
 fn pinhole(k: &Intrinsics) -> Pinhole {
     Pinhole::new(PinholeProjection::from_focal_length_and_principal_point(
         [k.fx as f32, k.fy as f32],
@@ -113,14 +113,14 @@ fn pinhole(k: &Intrinsics) -> Pinhole {
     .with_resolution([k.width as f32, k.height as f32])
 }
 
-/// The picture's bytes as they are. One of another size than the camera's would be drawn where it is not.
+/// The picture's bytes, unchanged. A picture of another size than the camera's is left out, since it would be misplaced.
 fn picture(
     folder: &Path,
     entry: &Entry,
     size: Option<(u32, u32)>,
     problems: &mut Vec<FrameProblem>,
 ) -> Option<EncodedImage> {
-    // A missing file has been reported with the frame, as has a size that contradicts the sidecar.
+    // A missing file or a wrong size has been reported with the frame.
     let picture = picture_of(folder, entry).ok()?;
     if size.is_some_and(|size| size != picture.size) {
         return None;
@@ -154,7 +154,7 @@ fn depth(
     let (width, height) = (file.width, file.height);
     let found = (width, height);
     if let Some(expected) = size.filter(|size| *size != found) {
-        // A PNG's size has been compared with the sidecar's already.
+        // A PNG's size has already been compared with the sidecar's.
         if file.code == DepthCode::Metres {
             add(problems, FrameProblem::DepthSize { found, expected });
         }
@@ -168,14 +168,14 @@ fn depth(
     Some(image.with_meter(values_per_metre))
 }
 
-/// Some things are noticed twice.
+/// Adds a problem, unless it was already found elsewhere.
 fn add(problems: &mut Vec<FrameProblem>, problem: FrameProblem) {
     if !problems.contains(&problem) {
         problems.push(problem);
     }
 }
 
-/// A line for the frame: its name, or a warning for each thing that is wrong with it.
+/// A line for the frame: its name, or a warning for each of its problems.
 fn log_name<W: Write>(
     recording: &mut Recording<W>,
     time: &TimePoint,

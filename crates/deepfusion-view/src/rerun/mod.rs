@@ -6,13 +6,13 @@
 //! | `world/camera` | `world_from_cam`; identity if the camera's motion is unknown |
 //! | `world/camera/image` | the pinhole camera |
 //! | `world/camera/image/rgb`, `…/depth` | the picture's own bytes; depth in the numbers of its file, with their metre |
-//! | `world/camera/targets`, `…/velocities`, `…/ground` | boxes, where they will be in a second, the road's plane; in the camera's axes |
-//! | `world/tracks` | where the targets were |
+//! | `world/camera/targets`, `…/velocities`, `…/ground` | boxes, arrows to their positions in a second, the road's plane; in the camera's axes |
+//! | `world/tracks` | the targets' past positions |
 //! | `speed_mps`, `time_to_collision_s`, `nearest_m`, `scale_ratio`, `latency_ms` | numbers of the frame |
-//! | `frames` | the frame's name, and what is wrong with it |
+//! | `frames` | the frame's name, or its problems |
 //!
-//! Timelines: `frame`, the place in the folder from 0, and `time`, seconds from the recording's first stamp, where it is known.
-//! What is below the pinhole is a picture to the viewer, what is in metres therefore lies beside it.
+//! Timelines: `frame`, the index in the folder from 0, and `time`, seconds from the recording's first stamp, if known.
+//! The viewer takes everything below the pinhole for a picture, so data in metres is beside it.
 
 mod frame;
 mod recording;
@@ -35,17 +35,17 @@ pub fn rerun_version() -> String {
 /// What [`write_rerun`] wrote.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RerunReport {
-    /// How many frames the file holds.
+    /// Number of frames in the file.
     pub frames: usize,
-    /// What is wrong with which frames, in their order: name and problem. The rest of such a frame is in the file.
+    /// Problems in the order of the frames: the frame's name and the problem. The rest of such a frame is in the file.
     pub problems: Vec<(String, FrameProblem)>,
 }
 
-/// Writes all frames of a folder to a file for the rerun viewer, beside its name first. What is wrong with a frame is reported,
-/// and the rest goes on. `progress` receives the frames done and the total; if `stop` returns true, nothing is left behind.
+/// Writes all frames of a folder to a file for the rerun viewer, first under a temporary name. Problems with a frame are reported,
+/// and the rest is written. `progress` receives the frames done and the total; if `stop` returns true, no file is left.
 ///
 /// # Errors
-/// [`Error::NoFrames`] for a training run, [`Error::Stopped`], [`Error::File`] where writing fails, [`Error::Encoding`].
+/// [`Error::NoFrames`] for a training run, [`Error::Stopped`], [`Error::File`] if writing fails, [`Error::Encoding`].
 pub fn write_rerun(
     folder: &Folder,
     path: &Path,

@@ -12,21 +12,21 @@ use re_sdk_types::archetypes::{Clear, RecordingInfo, ViewCoordinates};
 
 use crate::EncodingProblem;
 
-/// What recordings are called by the program that made them: the viewer keeps one layout of its windows for each.
+/// The application's name in recordings: the viewer keeps one layout of its windows for each application.
 const APPLICATION: &str = "deepfusion";
 
 /// A recording that is being written.
 pub(super) struct Recording<W: Write> {
     encoder: Encoder<W>,
     store: StoreId,
-    /// Entities with content, which has to be cleared when it disappears.
+    /// Entities with content that must be cleared when it disappears.
     shown: HashSet<&'static str>,
 }
 
 impl<W: Write> Recording<W> {
-    /// Begins with the static content. `name` is shown to users.
+    /// Starts a recording with the static content. `name` is shown to users.
     pub(super) fn begin(out: W, name: &str) -> Result<Self, EncodingProblem> {
-        // Another id each time: two files of one folder stay two recordings.
+        // A new id each time, so that two files of one folder stay separate recordings.
         let store = StoreId::random(StoreKind::Recording, APPLICATION);
         let made_by = format!("deepfusion {}", env!("CARGO_PKG_VERSION"));
         let info = StoreInfo::new(store.clone(), StoreSource::Other(made_by));
@@ -52,7 +52,7 @@ impl<W: Write> Recording<W> {
         Ok(recording)
     }
 
-    /// Logs an entity's content from then on.
+    /// Logs an entity's content from this time on.
     pub(super) fn log(
         &mut self,
         entity: &'static str,

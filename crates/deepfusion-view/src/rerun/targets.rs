@@ -8,7 +8,7 @@ use re_sdk_types::datatypes::Quaternion;
 
 /// What is drawn of a target.
 pub(super) struct SeenTarget {
-    /// Its track.
+    /// Its track's number.
     pub id: u64,
     pub centre: [f64; 3],
     /// Length, width, height.
@@ -43,7 +43,7 @@ impl SeenTarget {
         }
     }
 
-    /// The same as in the pictures that `perceive` writes.
+    /// The colour of the track, as in the pictures that `perceive` writes.
     pub(super) fn colour(&self) -> Color {
         let [r, g, b] = colour_of(self.id).0;
         Color::from_rgb(r, g, b)
@@ -88,7 +88,7 @@ pub(super) fn velocities(targets: &[SeenTarget]) -> Option<Arrows3D> {
     })
 }
 
-/// A grid of 5 m on the plane normal·p + offset = 0, from before the camera to 50 m; `None` without a plane that one could drive on.
+/// A grid of 5 m on the plane normal·p + offset = 0, from the camera to 50 m ahead; `None` if the plane is too steep to drive on.
 pub(super) fn ground(plane: GroundPlane) -> Option<LineStrips3D> {
     const GREY: [u8; 4] = [140, 140, 140, 120];
     let [nx, ny, nz] = plane.normal.map(f64::from);

@@ -6,7 +6,7 @@ use re_sdk_types::archetypes::LineStrips3D;
 
 use super::targets::SeenTarget;
 
-/// So many frames back a path is drawn.
+/// How many frames back a path is drawn.
 const FRAMES: usize = 50;
 
 /// The paths of the tracks seen so far.
@@ -16,12 +16,12 @@ pub(super) struct Tracks {
     frame: usize,
 }
 
-/// Centres in the world, metres, each with the frame it was seen in.
+/// Centres in world axes, in metres, each with its frame's number.
 type TrackPath = VecDeque<(usize, [f32; 3])>;
 
 impl Tracks {
-    /// Adds a frame and returns the paths of its targets, if there are any. Without the camera's pose there is no world to draw
-    /// them in.
+    /// Adds a frame and returns the paths of its targets, if there are any. Without the camera's pose, world axes are unknown and there
+    /// are none.
     pub(super) fn add(
         &mut self,
         targets: &[SeenTarget],

@@ -17,7 +17,7 @@ pub(crate) struct Browser {
     answers: Receiver<Value>,
     session: Option<String>,
     count: u64,
-    /// What the page complained of.
+    /// The page's errors.
     pub complaints: Vec<String>,
     _profile: tempfile::TempDir,
 }
@@ -48,7 +48,7 @@ impl Browser {
             return None;
         };
         let profile = tempfile::tempdir().unwrap();
-        // The protocol speaks on handles 3 and 4: the shell puts our two pipes there.
+        // The protocol uses file descriptors 3 and 4; the shell connects our two pipes to them.
         let mut process = Command::new("sh")
             .args([
                 "-c",
@@ -125,7 +125,7 @@ impl Browser {
         Some(browser)
     }
 
-    /// Gives an order and waits for its result.
+    /// Sends a command and waits for its result.
     pub(crate) fn order(&mut self, method: &str, parameters: Value) -> Value {
         self.count += 1;
         let mut order = json!({"id": self.count, "method": method, "params": parameters});
@@ -170,7 +170,7 @@ impl Browser {
         }
     }
 
-    /// The value of an expression, or of the promise that it is.
+    /// The value of an expression, or the one that its promise resolves to.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters =
             json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
@@ -219,7 +219,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // By name of nobody: the child that was started here.
+        // Only the child that was started here.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }

@@ -19,7 +19,7 @@ pub(crate) const SIZE: (u32, u32) = (96, 48);
 /// fx, fy, cx, cy of the generated camera.
 pub(crate) const CAMERA: [f64; 4] = [60.0, 58.0, 47.0, 22.5];
 
-/// Steps of 1/256 m at a pixel of frame `i`: a slope with a hole, other in every frame.
+/// Steps of 1/256 m at a pixel of frame `i`: a slope with a hole, different in every frame.
 pub(crate) fn steps(i: usize, x: u32, y: u32) -> u16 {
     if x < 4 && y < 4 {
         0
@@ -28,7 +28,7 @@ pub(crate) fn steps(i: usize, x: u32, y: u32) -> u16 {
     }
 }
 
-/// The target of every frame, in camera axes: it comes nearer by half a metre a frame.
+/// The target of frame `i`, in camera axes: it comes nearer by half a metre per frame.
 pub(crate) fn target(i: usize) -> Value {
     json!({
         "id": 7, "center_m": [1.0, 0.5, 14.0 - 0.5 * i as f64], "size_m": [4.0, 1.8, 1.5], "yaw_rad": 0.6, "distance_m": 14.0,
@@ -87,7 +87,7 @@ pub(crate) fn results(count: usize) -> tempfile::TempDir {
     folder
 }
 
-/// A server at work; it ends when this goes.
+/// A running server, which stops when this value is dropped.
 pub(crate) struct Running {
     pub address: SocketAddr,
     pub url: String,
@@ -120,14 +120,14 @@ impl Running {
         self.raw(request.as_bytes())
     }
 
-    /// The JSON of a path that is there.
+    /// The JSON of a path, which must exist.
     pub(crate) fn json(&self, path: &str) -> Value {
         let (status, body) = self.get(path);
         assert_eq!(status, 200, "{path}: {}", String::from_utf8_lossy(&body));
         serde_json::from_slice(&body).unwrap()
     }
 
-    /// Status and body of what is answered to these bytes.
+    /// Status and body of the answer to these bytes.
     pub(crate) fn raw(&self, request: &[u8]) -> (u16, Vec<u8>) {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream
@@ -160,7 +160,7 @@ impl Drop for Running {
     }
 }
 
-/// This machine, whatever port is free.
+/// This machine, on any free port.
 pub(crate) fn any_port() -> Settings {
     Settings {
         host: [127, 0, 0, 1].into(),

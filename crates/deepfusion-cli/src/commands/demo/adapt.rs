@@ -1,4 +1,4 @@
-//! With the embedded network: what it sees zero-shot, on a street it has never seen, and what learning there adds.
+//! The demo with the embedded network: its zero-shot depth on a new street, and what training there adds.
 
 use std::path::Path;
 use std::time::Instant;
@@ -26,7 +26,7 @@ struct Typed {
 
 /// The demo of an embedded network.
 pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
-    say("1/4 simulating a drive along a street that no network has seen");
+    say("1/4 simulating a drive along a street that the network has never seen");
     let drive = demo.simulate("street", &street(&demo.settings))?;
     let parts = SplitDrive::of(&drive, &demo.folder)?;
 
@@ -53,16 +53,16 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     ));
     let targets = demo.folder.join("targets");
     let followed = perceive(demo, &drive, &targets);
-    // Before what it says of being interrupted: this is no command that can be repeated.
+    // Checked before the error of `perceive`, whose hint for an interrupted run does not apply to the demo.
     interrupt::check(DEMO)?;
     followed?;
     let zero_shot = measure(&mut estimator, &parts.learned, &parts.measured)?;
     say(&format!(
-        "abs_rel {:.3} unscaled, from one image and nothing learned here",
+        "abs_rel {:.3} unscaled, from single images, without training here",
         zero_shot.report.unscaled.abs_rel
     ));
 
-    say("3/4 learning on the street's first part from images, speed and yaw rate");
+    say("3/4 training on the street's first part with images, speed and yaw rate");
     let start = Start::Packed {
         network,
         path: None,
@@ -77,7 +77,7 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
         start.initialise(model, &demo.device, &mut train::print_start)
     })?;
 
-    say("4/4 measuring again on the part that was not learned from; pictures and the report");
+    say("4/4 evaluating again on the part that was not trained on; pictures and the report");
     let mut estimator = demo.estimator(&adapted)?;
     let learned = measure(&mut estimator, &parts.learned, &parts.measured)?;
     let factors = adapted.interval_factors()?;
@@ -105,8 +105,8 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     demo.end(&learned, &html)
 }
 
-/// 3D targets of the whole drive, followed over time, with pictures: the program's own command, which takes the embedded
-/// network where none is named.
+/// 3D targets of the whole drive, tracked over time, with pictures, by the command `perceive` with its default, the embedded
+/// network.
 fn perceive(demo: &Demo, drive: &Path, out: &Path) -> Result<()> {
     let device = demo.args.device.to_string();
     let words = [

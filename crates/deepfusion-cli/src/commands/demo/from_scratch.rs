@@ -1,4 +1,4 @@
-//! From scratch: six simulated streets, a small network that knows nothing, and a seventh street to be measured on.
+//! The demo from scratch: six simulated streets, a small untrained network, and a seventh street to evaluate on.
 
 use deepfusion_data::{Cameras, Dataset, OpenOptions};
 use deepfusion_jobs::ModelFacts;
@@ -14,7 +14,7 @@ use crate::progress::say;
 
 /// The demo that needs no embedded network.
 pub(super) fn run(demo: &Demo) -> Result<()> {
-    say("1/4 simulating streets to learn on, and another to be measured on");
+    say("1/4 simulating streets to train on, and another to evaluate on");
     let train_drives = training_streets(&demo.settings)
         .iter()
         .enumerate()
@@ -25,7 +25,7 @@ pub(super) fn run(demo: &Demo) -> Result<()> {
     say("2/4 learning depth from the images and the car's motion (speed, yaw rate)");
     let model = demo.learn(recipe(&demo.settings, &train_drives), Ok)?;
 
-    say("3/4 measuring on the street never seen");
+    say("3/4 evaluating on the street never seen");
     let mut estimator = demo.estimator(&model)?;
     let train_sets = open_datasets(&train_drives, None, Cameras::default())?;
     let test_sets = Dataset::open(&test_drive, &OpenOptions::default())?;

@@ -1,6 +1,5 @@
-//! The whole way with no data at all. The embedded network sees a simulated street zero-shot, learns there from images and
-//! motion, and is measured before and after. Or streets are simulated, a small network learns depth on them from scratch,
-//! and is measured on another.
+//! `deepfusion demo`: all steps, without any data. The embedded network is evaluated zero-shot on a simulated street, trained there with
+//! images and motion, and evaluated again. Or a small network is trained from scratch on simulated streets and evaluated on another.
 
 mod adapt;
 mod from_scratch;
@@ -27,12 +26,12 @@ use crate::failure::Result;
 use crate::progress::{Progress, duration_text, say};
 use crate::{devices, engine, interrupt, output};
 
-/// Its name in the message that it was stopped.
+/// The demo's name in the message that it was stopped.
 const DEMO: &str = "the demo";
 
 /// `deepfusion demo`.
 pub(super) fn run(args: &DemoArgs) -> Result<()> {
-    // The first notice is the one that stands: what training and `perceive` say of going on does not hold here.
+    // Only the first notice is used: those of training and `perceive`, about continuing, do not apply here.
     interrupt::catch(
         "stopping after the frames, step or image at work; the demo cannot be resumed",
     );
@@ -64,7 +63,7 @@ fn settings(args: &DemoArgs) -> DemoSettings {
     }
 }
 
-/// What both ways have in common.
+/// What both demos have in common.
 struct Demo<'a> {
     args: &'a DemoArgs,
     start: Instant,
@@ -74,7 +73,7 @@ struct Demo<'a> {
 }
 
 impl Demo<'_> {
-    /// Simulates a drive into a folder of its own; gives the drive's.
+    /// Simulates a drive into its own folder and returns the drive's path.
     fn simulate(&self, name: &str, config: &SimConfig) -> Result<PathBuf> {
         let simulation = Simulation::new(config)?;
         let mut progress = Progress::new("simulating");
@@ -87,7 +86,7 @@ impl Demo<'_> {
             Err(SimError::Stopped { .. }) => Err(CliError::Ended { what: DEMO }.into()),
             written => {
                 let drive = written?;
-                // Labels and the disk take a while after the last frame.
+                // After the last frame, labels are still written, which takes a while.
                 interrupt::check(DEMO)?;
                 Ok(drive)
             }
@@ -113,7 +112,7 @@ impl Demo<'_> {
         engine::load(model, &EngineArgs::on(self.args.device))
     }
 
-    /// A frame of a drive, and the depth that a network sees in it.
+    /// A frame of a drive, and the depth that a network predicts for it.
     fn predict_frame(
         &self,
         network: (&mut DepthEstimator, &IntervalFactors),
@@ -129,12 +128,12 @@ impl Demo<'_> {
         )?)
     }
 
-    /// Seconds from its start.
+    /// Seconds since the demo started.
     fn seconds(&self) -> f64 {
         self.start.elapsed().as_secs_f64()
     }
 
-    /// Prints what it came to and where it lies.
+    /// Prints the metrics and the paths of the outputs.
     fn end(&self, evaluated: &Evaluated, page: &Path) -> Result<()> {
         let report = &evaluated.report;
         say(&format!(
@@ -152,7 +151,7 @@ impl Demo<'_> {
     }
 }
 
-/// As [`demo::measure`], with its progress; it can be stopped between two frames.
+/// As [`demo::measure`], with progress; it can be stopped between two frames.
 fn measure(
     estimator: &mut DepthEstimator,
     train: &[Dataset],

@@ -1,4 +1,4 @@
-//! `deepfusion doctor --device`: whether a device computes what the processor does.
+//! `deepfusion doctor --device`: whether a device's results match the processor's.
 
 use std::io::{self, Write};
 use std::process::Command;
@@ -11,12 +11,12 @@ use crate::error::CliError;
 use crate::failure::{Context, Result};
 use crate::output;
 
-/// Compares, a line as each operation is done.
+/// Compares the device with the processor, printing a line as each operation is done.
 pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
     let device = devices::open(chosen)?;
     if !json {
         output::print(&format!(
-            "{chosen} beside the processor: errors over the largest value, at most {TOLERANCE}\n\n\
+            "{chosen} compared with the processor: largest difference over largest value, at most {TOLERANCE}\n\n\
              {:40} {:>9} {:>9}\n",
             "", "forward", "backward"
         ))?;
@@ -45,7 +45,7 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
     .into())
 }
 
-/// This program again, which checks the operations from one on and answers with [`print_from`].
+/// This program as a new process, which checks the operations from `first` on and answers with [`print_from`].
 fn again(chosen: ComputeDevice, first: &str) -> Result<Command> {
     let program = std::env::current_exe().context("cannot find this program's file")?;
     let mut command = Command::new(program);
@@ -55,12 +55,13 @@ fn again(chosen: ComputeDevice, first: &str) -> Result<Command> {
     Ok(command)
 }
 
-/// What a process does that a driver may end: each operation from this one on, printed as soon as it is done.
+/// Checks each operation from `first` on and prints it as soon as it is done: the part that runs in a process of its own, which a driver's
+/// crash may end.
 pub(super) fn print_from(chosen: ComputeDevice, first: &str) -> Result<()> {
     let device = devices::open(chosen)?;
     for check in checks_from(&device, first) {
         let text = answer_line(&check).context("cannot write a line of JSON")?;
-        // Whoever asked may be gone.
+        // The process that asked may have ended.
         if writeln!(io::stdout(), "{text}").is_err() {
             break;
         }
@@ -89,14 +90,14 @@ fn line(check: &OperationCheck) -> String {
     }
 }
 
-/// What to do without on a device.
+/// What the device can still be used for.
 fn hint(good_for: &DeviceUse) -> String {
     match good_for {
         DeviceUse::Nothing => {
-            "use `--device cpu`: depth would not be what was trained; another backend or a newer driver may be right".into()
+            "use `--device cpu`, another backend or a newer driver: depth from this device would be wrong".into()
         }
         DeviceUse::Prediction => {
-            "predict on it, and train with `--device cpu`: its gradients or losses are not to be relied on".into()
+            "predict on it, and train with `--device cpu`: its gradients or losses are wrong".into()
         }
         DeviceUse::TrainingWithout(parts) => {
             let parts: Vec<&str> = parts.iter().copied().filter_map(without).collect();
@@ -105,7 +106,7 @@ fn hint(good_for: &DeviceUse) -> String {
     }
 }
 
-/// The option by which training does without something.
+/// The option that trains without an operation.
 fn without(part: NeededBy) -> Option<&'static str> {
     Some(match part {
         NeededBy::Flow => "`--without flow`",
@@ -124,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_to_do_without_is_said_in_options() {
+    fn the_hint_names_options() {
         assert!(hint(&DeviceUse::Nothing).contains("--device cpu"));
         assert!(hint(&DeviceUse::Prediction).starts_with("predict on it"));
         let of = |parts: &[NeededBy]| hint(&DeviceUse::TrainingWithout(parts.to_vec()));

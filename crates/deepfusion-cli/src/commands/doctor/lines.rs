@@ -1,4 +1,4 @@
-//! A line a check: in order, found something, or not checked and why.
+//! One line per check: ok, what was found, or why it was not checked.
 
 use std::fmt::Write as _;
 
@@ -14,8 +14,8 @@ pub(super) fn of(diagnosis: &Diagnosis) -> String {
     text
 }
 
-/// The checks by name, in the order in which they come, each with how it came out in all drives. Those that had nothing to look at, because
-/// the recording cannot be opened, are one row.
+/// The checks by name, in order, each with its result over all drives. Checks that were skipped because the recording cannot be opened
+/// are one row.
 pub(super) fn rows(diagnosis: &Diagnosis) -> Vec<(&'static str, String)> {
     let (unopened, checks): (Vec<_>, Vec<_>) =
         diagnosis.checks().into_iter().partition(had_nothing);
@@ -35,12 +35,12 @@ fn had_nothing(check: &CheckSummary<'_>) -> bool {
     outcomes.all(|(_, outcome)| outcome.skipped == Some(SkipReason::NotOpened))
 }
 
-/// How one check came out.
+/// The result of one check.
 fn summary(check: &CheckSummary<'_>) -> String {
     if let [(_, only)] = check.outcomes.as_slice() {
         return match (only.status(), &only.skipped) {
             (Status::Ok, None) => "ok".into(),
-            (Status::Ok, Some(why)) => format!("ok in part: {why}"),
+            (Status::Ok, Some(why)) => format!("partly checked, ok: {why}"),
             (Status::Found, _) => format!("found: {}", counts(only)),
             (Status::NotChecked, why) => {
                 let why = why.as_ref().map(ToString::to_string);

@@ -1,4 +1,4 @@
-//! What this machine has for the program: `deepfusion doctor` without a recording.
+//! What this machine offers to the program: `deepfusion doctor` without a recording.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use crate::devices::Backend;
 use crate::failure::Result;
 use crate::output;
 
-/// Prints it.
+/// Prints the machine's properties.
 pub(super) fn run(json: bool) -> Result<()> {
     let machine = Machine::inspect();
     if json {
@@ -35,7 +35,7 @@ fn text(machine: &Machine) -> String {
         .map(InstructionSet::name)
         .collect();
     let simd = if simd.is_empty() {
-        "no vector instructions that are made use of".into()
+        "no vector instructions that this program uses".into()
     } else {
         simd.join(", ")
     };
@@ -46,7 +46,7 @@ fn text(machine: &Machine) -> String {
         gigabytes(machine.memory_total_mb),
     );
     line("memory", format!("{free} free of {total}"));
-    // What `--device` takes.
+    // The values of `--device`.
     let devices: Vec<&str> = machine.devices.iter().copied().map(Backend::name).collect();
     line("devices", devices.join(", "));
     if devices.len() == 1 {
@@ -59,13 +59,13 @@ fn text(machine: &Machine) -> String {
         (
             "ffmpeg",
             &machine.ffmpeg,
-            "videos need it; folders of images do not",
+            "needed for videos, but not for folders of images",
         ),
         ("ffprobe", &machine.ffprobe, "comes with ffmpeg"),
         (
             "ONNX Runtime",
             &machine.onnx_runtime,
-            "`--engine ort` alone needs it",
+            "needed only for `--engine ort`",
         ),
     ] {
         if tool.is_found() {

@@ -78,7 +78,7 @@ fn of_device(_: ComputeDevice, _: &DoctorArgs) -> Result<()> {
     Err(CliError::BuiltWithoutTraining { what: "--device" }.into())
 }
 
-/// An option that says nothing of what is looked at: a recording has a camera and its own file of settings, a log has columns.
+/// An option that does not apply to the input: options of cameras are for recordings, options of columns for logs.
 fn out_of_place(is_log: bool, args: &DoctorArgs) -> Option<&'static str> {
     let of_logs = [
         ("--time", args.time.is_some()),
@@ -134,7 +134,7 @@ fn unfit(path: &Path, errors: usize) -> CliError {
     }
 }
 
-/// A line for each check, the findings, the worst first; then what was measured, if asked for.
+/// A line for each check, then the findings, the worst first, and then, with `verbose`, every measurement.
 fn text(diagnosis: &Diagnosis, verbose: bool) -> String {
     let mut text = String::new();
     for drive in &diagnosis.drives {
@@ -147,7 +147,7 @@ fn text(diagnosis: &Diagnosis, verbose: bool) -> String {
         };
         let _ = writeln!(
             text,
-            "{}{camera}: {}, {} looked at",
+            "{}{camera}: {}, {} checked",
             drive.name,
             count_of(drive.frames, "frame"),
             drive.looked_at
@@ -188,7 +188,7 @@ fn text(diagnosis: &Diagnosis, verbose: bool) -> String {
     text
 }
 
-/// Every figure.
+/// Every measurement, one per line.
 fn figures(diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
     for (_, outcome) in diagnosis.outcomes() {

@@ -1,4 +1,4 @@
-//! The doctor's page: findings, figures, plots over time, measured depth on images.
+//! The doctor's page: findings, measurements, plots over time, measured depth on images.
 
 use std::path::Path;
 
@@ -33,7 +33,7 @@ pub(super) fn write(
         .collect();
     report = report.section("Findings");
     report = if rows.is_empty() {
-        report.paragraph("None: every figure keeps to its limit.")
+        report.paragraph("None: every measurement is within its limit.")
     } else {
         report.table(&["finding", "measured", "hint", "drive", "frame"], &rows)
     };
@@ -90,9 +90,9 @@ fn figures(report: HtmlReport, drive: &DriveDiagnosis) -> HtmlReport {
     for outcome in &drive.outcomes {
         for figure in &outcome.measured {
             let holds = if figure.holds() {
-                "holds"
+                "within its limit"
             } else {
-                "does not hold"
+                "outside its limit"
             };
             rows.push(vec![
                 outcome.check.to_owned(),
@@ -108,5 +108,5 @@ fn figures(report: HtmlReport, drive: &DriveDiagnosis) -> HtmlReport {
             ]);
         }
     }
-    report.table(&["check", "figure", ""], &rows)
+    report.table(&["check", "measured", ""], &rows)
 }

@@ -1,4 +1,4 @@
-//! A network measured on recordings.
+//! A network evaluated on recordings.
 
 use deepfusion_data::{Dataset, GtKind, OpenOptions};
 use deepfusion_eval::compare::SavedEvaluation;
@@ -23,7 +23,7 @@ use crate::failure::Result;
 use crate::model::{self, ModelFacts};
 use crate::progress::{Progress, say};
 
-/// A network, and the recordings that it is measured on.
+/// A network, and the recordings that it is evaluated on.
 struct EvalInputs {
     model: ModelSource,
     estimator: DepthEstimator,
@@ -56,7 +56,7 @@ pub(super) fn outcome(args: &EvalArgs) -> Result<EvaluationOutcome> {
     })
 }
 
-/// Opens the network and the recordings; what cannot be kept afterwards is refused before anything is measured.
+/// Opens the network and the recordings. A calibration that could not be saved is refused before anything is measured.
 fn open(args: &EvalArgs) -> Result<EvalInputs> {
     warnings::warn_of_hfov(args.hfov);
     let model = model::chosen(args.model.as_deref())?;
@@ -92,7 +92,7 @@ fn open(args: &EvalArgs) -> Result<EvalInputs> {
     })
 }
 
-/// That a network's intervals can be calibrated at all.
+/// Checks that a network's intervals can be calibrated and saved.
 fn check_calibration(model: &ModelSource, estimator: &DepthEstimator) -> Result<()> {
     if !estimator.knows_uncertainty() {
         return Err(deepfusion_jobs::Error::NoUncertainty.into());
@@ -107,7 +107,7 @@ fn check_calibration(model: &ModelSource, estimator: &DepthEstimator) -> Result<
     }
 }
 
-/// Whether depth is compared with ground truth: there is some, or something was asked for that needs it, which is an error where there is none.
+/// Whether to compare depth with ground truth: if there is some, or if an option needs it; then missing ground truth is an error.
 fn with_truth(args: &EvalArgs, datasets: &[Dataset]) -> bool {
     let needs_truth = args.gt_depth == GtKind::Annotated
         || args.gt.is_some()
@@ -118,7 +118,7 @@ fn with_truth(args: &EvalArgs, datasets: &[Dataset]) -> bool {
     needs_truth || has_truth(datasets, args.gt_depth)
 }
 
-/// Compares depth with ground truth, beside the mean-depth baseline.
+/// Compares depth, and the mean-depth baseline, with ground truth.
 fn measure<'a>(args: &'a EvalArgs, inputs: &mut EvalInputs) -> Result<Measurement<'a>> {
     let EvalInputs {
         estimator,
@@ -144,7 +144,7 @@ fn measure<'a>(args: &'a EvalArgs, inputs: &mut EvalInputs) -> Result<Measuremen
     Ok(measured)
 }
 
-/// Adds whether the network's intervals hold, and calibrates them where that is asked for.
+/// Adds how often the network's intervals contain the truth, and calibrates them if asked for.
 fn measure_intervals(
     args: &EvalArgs,
     inputs: &mut EvalInputs,
@@ -157,7 +157,7 @@ fn measure_intervals(
     )?;
     if let Some((found, path)) = kept {
         say(&format!(
-            "intervals calibrated on {} of {}, kept as {}; the figures below are of the same pixels: measure on other drives",
+            "intervals calibrated on {} of {} and saved as {}; the results below are for these same pixels: evaluate on other drives as well",
             count_of(found.pixels, "pixel"),
             count_of(found.drives, "drive"),
             path.display()
@@ -166,7 +166,7 @@ fn measure_intervals(
     Ok(())
 }
 
-/// Keeps what was found beside the run.
+/// Saves the evaluation in the run's folder.
 fn keep(
     request: &EvaluationRequest<'_>,
     inputs: &EvalInputs,
@@ -180,18 +180,18 @@ fn keep(
     } = inputs;
     let saved = request.saved(model, estimator, datasets, evaluated)?;
     match model.folder().map(|folder| saved.write(folder)) {
-        Some(Ok(path)) => say(&format!("kept as {}", path.display())),
-        // A run on a disk that cannot be written is measured all the same.
-        Some(Err(error)) => tracing::warn!("the result is not kept beside the run: {error}"),
+        Some(Ok(path)) => say(&format!("saved as {}", path.display())),
+        // A run on a read-only disk can still be evaluated.
+        Some(Err(error)) => tracing::warn!("the result is not saved in the run's folder: {error}"),
         None => say(&format!(
-            "not kept: `{}` has no run's folder; --json prints what `compare` reads",
+            "not saved: `{}` has no run folder; --json prints what `compare` reads",
             model.name()
         )),
     }
     Ok(saved)
 }
 
-/// How a network was measured, as its evaluation keeps it.
+/// How a network was evaluated, as saved with its evaluation.
 fn request<'a>(
     args: &'a EvalArgs,
     options: &OpenOptions,
@@ -209,7 +209,7 @@ fn request<'a>(
     }
 }
 
-/// Learns a pixel's confidence where that is asked for; gives how it holds.
+/// Fits the confidence of pixels, if asked for, and returns its reliability.
 fn calibrate_confidence(
     args: &EvalArgs,
     inputs: &mut EvalInputs,
@@ -232,7 +232,7 @@ fn calibrate_confidence(
     }))
 }
 
-/// Writes the page where `--report` asks for it.
+/// Writes the page, with `--report`.
 fn write_page(
     args: &EvalArgs,
     inputs: &mut EvalInputs,

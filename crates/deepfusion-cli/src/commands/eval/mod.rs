@@ -1,4 +1,4 @@
-//! `deepfusion eval`: depth against ground truth, or judged without it.
+//! `deepfusion eval`: depth compared with ground truth, or evaluated without it.
 
 mod from_model;
 mod verdict;
@@ -82,7 +82,7 @@ fn from_arrays(
     Ok(evaluated.report)
 }
 
-/// Writes the drawn points where `--points-out` asks for them.
+/// Writes the drawn points, with `--points-out`.
 fn write_points(args: &EvalArgs, evaluated: &Evaluated) -> Result<()> {
     let Some(path) = &args.points_out else {
         return Ok(());

@@ -1,4 +1,4 @@
-//! What is said of depth without ground truth.
+//! The evaluation of depth without ground truth.
 
 use deepfusion_data::Dataset;
 use deepfusion_eval::verdict::Verdict;
@@ -14,13 +14,13 @@ use crate::commands::{command_line, warnings};
 use crate::failure::Result;
 use crate::progress::{Progress, say};
 
-/// Whether no verdict is wanted: it was declined, a split asks for its frames alone, or what is post-processed is no longer what the network
-/// says.
+/// Whether no verdict is wanted: it was declined, ground truth or a split's frames are to be used, or post-processing changes the network's
+/// own prediction.
 pub(super) fn is_declined(args: &EvalArgs) -> bool {
     args.no_verdict || args.split.is_some() || args.gt.is_some() || args.post_process.is_some()
 }
 
-/// The verdict, where the recordings say how the camera moved and it was not declined.
+/// The verdict, if a recording contains the camera's motion and the verdict was not declined.
 pub(super) fn of_model(
     args: &EvalArgs,
     model: &ModelSource,
@@ -36,7 +36,7 @@ pub(super) fn of_model(
         unseen_by(model, estimator.config(), datasets)?
     };
     let options = VerdictOptions::new(args.speed_error / 100.0, !args.no_focal_correction);
-    let mut progress = Progress::new("judging without ground truth");
+    let mut progress = Progress::new("evaluating without ground truth");
     let mut found = verdict(
         estimator,
         datasets,
@@ -59,17 +59,17 @@ pub(super) fn of_model(
     Ok(Some(found))
 }
 
-/// A warning with the option that does without what it is about.
+/// A warning with the option that overrides it.
 fn in_options(warning: &VerdictWarning) -> String {
     match warning {
         VerdictWarning::SeenNotKnown => {
-            format!("{warning}; --assume-unseen takes it that it did not")
+            format!("{warning}; --assume-unseen assumes that it did not")
         }
         other => other.to_string(),
     }
 }
 
-/// What the run's PoseNet makes of the vehicle's speed.
+/// Adds the vehicle's speed as predicted by the run's PoseNet.
 #[cfg(feature = "train")]
 fn add_pose_speeds(
     args: &EvalArgs,
@@ -92,7 +92,7 @@ fn add_pose_speeds(
     Ok(())
 }
 
-/// Without training's framework there is no PoseNet.
+/// Without the training framework there is no PoseNet.
 #[cfg(not(feature = "train"))]
 fn add_pose_speeds(
     _: &EvalArgs,
@@ -104,7 +104,7 @@ fn add_pose_speeds(
     Ok(())
 }
 
-/// What `eval` finds where there is no ground truth.
+/// The outcome of `eval` without ground truth.
 pub(super) fn alone(
     args: &EvalArgs,
     model: &ModelSource,

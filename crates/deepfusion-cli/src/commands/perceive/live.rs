@@ -1,4 +1,4 @@
-//! Targets of a camera or a stream.
+//! Targets from a camera or a stream.
 
 use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::{DepthJob, record_line};
@@ -13,7 +13,7 @@ use crate::failure::Result;
 use crate::output;
 use crate::progress::say;
 
-/// Looks at a live source until it ends.
+/// Finds the targets of a live source until it ends.
 pub(super) fn run(
     args: &PerceiveArgs,
     job: &DepthJob<'_>,

@@ -1,4 +1,4 @@
-//! `deepfusion perceive`: images to 3D targets, followed over time.
+//! `deepfusion perceive`: images to 3D targets, tracked over time.
 
 mod live;
 
@@ -54,12 +54,12 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
     };
     let finder = TargetFinder::open(&model, &mut estimator, settings)?;
     output::make_folder(out)?;
-    // Before anything there is replaced: it may be what another run is writing.
+    // Before existing files are replaced: another run may be writing them.
     let _lock = Lock::take_whole(out)?;
     if source.is_some() {
         deepfusion_jobs::live::make_room(out, prediction.overwrite)?;
     }
-    // Nothing is overwritten unless asked, whoever wrote it.
+    // No file is overwritten unless asked, whichever program wrote it.
     if !prediction.overwrite {
         require_unwritten(&job.writer, &args.save, &all)?;
     }
@@ -70,7 +70,7 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
     }
 }
 
-/// Finds the targets of images that are there.
+/// Finds the targets of existing images.
 fn perceive_images(
     args: &PerceiveArgs,
     job: &DepthJob<'_>,
@@ -86,12 +86,12 @@ fn perceive_images(
         Ok(())
     };
     let summary = bulk::perceive(job, finder, all, &interrupt::asked, written);
-    // The bar is gone before anything else is printed.
+    // Removes the bar before anything else is printed.
     drop(shown);
     report(&args.prediction.out, summary?)
 }
 
-/// Says what became of the frames; an error where some are not done.
+/// Prints how many frames and targets were written; an error if some frames are not done.
 fn report(out: &Path, summary: TargetSummary<Failure>) -> Result<()> {
     let median = summary.median_latency_ms();
     let TargetSummary {

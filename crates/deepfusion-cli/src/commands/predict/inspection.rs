@@ -1,4 +1,4 @@
-//! What shows a network's layers: the training framework, in a build that has it.
+//! Shows a network's layers, with the training framework if the build has it.
 
 use crate::failure::Result;
 use deepfusion_jobs::bulk::ShowLayers;

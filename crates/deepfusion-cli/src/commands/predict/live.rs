@@ -1,4 +1,4 @@
-//! Depth of a camera or a stream.
+//! Depth from a camera or a stream.
 
 use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::{CameraSource, Lock};
@@ -15,7 +15,7 @@ use crate::failure::Result;
 use crate::progress::say;
 use crate::{engine, interrupt, output};
 
-/// `deepfusion predict` of a live source: no manifest, for there is nothing to go on with.
+/// `deepfusion predict` of a live source. It writes no manifest, since it cannot be continued.
 pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) -> Result<()> {
     let (prediction, out) = (&args.prediction, &args.prediction.out);
     if args.shard != Shard::WHOLE {
@@ -23,7 +23,7 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     }
     check_watched(prediction, Some(address), &[])?;
     let mut estimator = engine::load(model, &prediction.engine)?;
-    // They are nowhere else, and depth is little without them.
+    // The images exist nowhere else, and depth is of little use without them.
     let mut outputs = args.outputs();
     outputs.frames = true;
     let job = job(prediction, outputs, model, &estimator)?;
@@ -31,7 +31,7 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
         return Err(Error::NoCamera.into());
     }
     output::make_folder(out)?;
-    // Before room is made: the frames there may be those of a run that is at work.
+    // Before old frames are removed: another run may be writing them.
     let _lock = Lock::take_whole(out)?;
     live::make_room(out, prediction.overwrite)?;
     interrupt::catch("stopping after the frames at work");
@@ -62,13 +62,13 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
             ended.map_or("the source was lost", |e| e.as_str())
         ));
     }
-    let mut filmed = Ok(());
+    let mut video_written = Ok(());
     if args.video() {
-        filmed = seen
+        video_written = seen
             .write_video(out)
             .map(|video| print_videos(video.as_slice()))
             .map_err(Into::into);
     }
-    // Why the source ended comes first: a full disk ends the video, too.
-    seen.ending.and(filmed)
+    // The reason why the source ended comes first: a full disk also ends the video.
+    seen.ending.and(video_written)
 }

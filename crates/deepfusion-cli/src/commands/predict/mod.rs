@@ -52,7 +52,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
         return Err(Error::NoCamera.into());
     }
     output::make_folder(out)?;
-    interrupt::catch("stopping after the images at work; the same command goes on from there");
+    interrupt::catch("stopping after the images at work; the same command continues from there");
     let _lock = Lock::take(out, *shard)?;
     let StartedJob {
         manifest,
@@ -78,7 +78,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
             count_of(done - there, "image"),
             out.display(),
             if there > 0 {
-                format!(", {there} were there already")
+                format!(", {there} existed already")
             } else {
                 String::new()
             }
@@ -95,7 +95,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     Ok(())
 }
 
-/// Whether all images of a run are done, as an error for who started it; an error at once where the manifest could not be written.
+/// The inner error if not all images of a run are done, to be returned after the summary; the outer one if the manifest could not be written.
 fn outcome(summary: Summary<Failure>) -> Result<Result<()>> {
     let Summary {
         done,
@@ -135,7 +135,7 @@ fn outcome(summary: Summary<Failure>) -> Result<Result<()>> {
     Ok(Ok(()))
 }
 
-/// The images that the arguments mean; warnings of recordings among them are printed.
+/// The images that the arguments name; warnings of recordings among them are printed.
 pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<Vec<Input>> {
     let options = OpenOptions {
         assumed_camera: model.assumed_camera(args.engine.set.as_deref())?,
@@ -148,14 +148,14 @@ pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<
         let input = args.inputs.join(" ");
         return Err(CliError::OutputsAlone { input }.into());
     }
-    // After their names, which are the same without it.
+    // After the images got their names, which do not depend on this option.
     Ok(match args.frames {
         Some(most) => first_of_each(found, usize::try_from(most).unwrap_or(usize::MAX)),
         None => found,
     })
 }
 
-/// That the scale monitor's options are not given where it would never look: they would change nothing, silently.
+/// Refuses the scale monitor's options for inputs that it cannot monitor, where they would silently have no effect.
 ///
 /// # Errors
 /// [`CliError::Unwatched`].
@@ -186,7 +186,7 @@ pub(super) fn check_watched(
     }
 }
 
-/// Whether videos can be written in the end, to know before the work begins.
+/// Checks before the work begins that videos can be written at its end.
 fn check_videos(args: &PredictArgs) -> Result<()> {
     if !args.video() {
         return Ok(());
@@ -197,7 +197,7 @@ fn check_videos(args: &PredictArgs) -> Result<()> {
     Ok(can_write_video(&args.prediction.out)?)
 }
 
-/// Says which videos were written, and how many frames each has.
+/// Prints which videos were written, and how many frames each has.
 fn print_videos(videos: &[(PathBuf, usize)]) {
     for (path, frames) in videos {
         say(&format!(
@@ -217,7 +217,7 @@ pub(super) fn job<'a>(
 ) -> Result<DepthJob<'a>> {
     recordings::warn_of_hfov(args.hfov);
     let (settings, out) = (settings(args), &args.out);
-    // What shows the layers is a second network: it is not opened for a job that is refused.
+    // Checked first, so that no second network is opened for `show_layers` of a job that is refused.
     if outputs.need_uncertainty() && !estimator.knows_uncertainty() {
         return Err(Error::NoUncertainty.into());
     }
@@ -233,7 +233,7 @@ pub(super) fn job<'a>(
     Ok(job)
 }
 
-/// How images become depth, by the options.
+/// The settings of the options for predicting depth.
 fn settings(args: &PredictionArgs) -> DepthSettings {
     let numbers = args.intrinsics.map(CameraIntrinsics::numbers);
     let hfov = args.hfov.map(GivenCamera::Hfov);

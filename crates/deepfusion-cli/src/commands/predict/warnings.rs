@@ -1,35 +1,35 @@
-//! What may be wrong with the metres of a run's images, said with the options that mend it.
+//! Warnings that depth may be wrong, with the options that correct it.
 
 use deepfusion_jobs::bulk::ImageWarning;
 
 use crate::commands::warnings::of_another_size;
 
-/// Warns on stderr.
+/// Prints a warning on stderr.
 pub(super) fn print(warning: ImageWarning) {
     match warning {
         ImageWarning::AssumedCamera { calibration } => {
             let hint = match calibration {
-                Some(file) => format!("is this its calibration? --calib {}", file.display()),
+                Some(file) => format!("give --calib {} if that is its calibration", file.display()),
                 None => "give --intrinsics, --hfov or --calib".into(),
             };
             tracing::warn!(
-                "no intrinsics given, and none in the image's EXIF: the training camera's field of view is assumed, so the metres are \
-                 only as right as that is (camera_known: false; {hint})"
+                "no intrinsics given, and none in the image's EXIF: assuming the training camera's field of view, so depth in metres is \
+                 only as accurate as that (camera_known: false; {hint})"
             );
         }
         ImageWarning::LearnedCamera => tracing::warn!(
-            "no intrinsics given: the camera that the run learned is taken, so the metres are only as right as that is \
+            "no intrinsics given: using the camera that the run learned, so depth in metres is only as accurate as that \
              (camera_known: false; give --intrinsics, --hfov or --calib)"
         ),
         ImageWarning::OtherSize { image, camera } => {
             tracing::warn!("{}: {}", image.display(), of_another_size(&camera));
         }
         ImageWarning::PoorFit { image, fit } => {
-            tracing::warn!("{}: {fit} (others like it are not named)", image.display());
+            tracing::warn!("{}: {fit} (similar images are not listed)", image.display());
         }
         ImageWarning::Drift { frame, ratio } => tracing::warn!(
-            "{frame}: the scale has drifted: by the road, metres are {ratio:.2} times their initial size. Were the images zoomed, the camera \
-             moved, or is the speed wrong? (scale_monitor in each frame's JSON; --correct-scale brings depth back)"
+            "{frame}: the scale has drifted: measured on the road, metres are {ratio:.2} times their initial size; check for zoom, a moved \
+             camera or a wrong speed (see scale_monitor in each frame's JSON; --correct-scale corrects depth)"
         ),
     }
 }

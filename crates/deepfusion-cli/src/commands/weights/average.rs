@@ -14,7 +14,7 @@ use crate::progress::say;
 struct Made<'a> {
     checkpoint: &'a Path,
     networks: &'a [AveragedNetwork],
-    /// Whether all began from the same trained network.
+    /// Whether training of all of them started from the same network.
     related: bool,
     statistics: Option<&'a StatisticsSpread>,
 }
@@ -35,10 +35,10 @@ pub(crate) fn run(args: &AverageArgs) -> Result<()> {
     match made.kinship {
         Kinship::Network => {}
         Kinship::FirstWeights => tracing::warn!(
-            "these networks have only their first random weights in common, those of one seed; the mean of such networks is often worse than either: measure it"
+            "these networks have only their random first weights in common (the same seed); the mean of such networks is often worse than each: evaluate it"
         ),
         Kinship::Unknown => tracing::warn!(
-            "nothing shows that these networks were trained from the same one; the mean of unrelated networks is worthless"
+            "these networks may not have been trained from the same one; the mean of unrelated networks is useless"
         ),
     }
     if made.lost_uncertainty {
@@ -52,8 +52,8 @@ pub(crate) fn run(args: &AverageArgs) -> Result<()> {
     }) = made.statistics
     {
         tracing::warn!(
-            "the running statistics of {layers} of {of} batch norms differ; their mean is not exact (the variance lacks up to {:.2} %): measure this network \
-             beside the others; training on from it without frozen_statistics measures them anew",
+            "the running statistics of {layers} of {of} batch norms differ; their mean is not exact (the variance is too small by up to {:.2} %): evaluate this network \
+             and the others; continuing training from it without frozen_statistics measures the statistics again",
             100.0 * left_out
         );
     }

@@ -13,7 +13,7 @@ use crate::progress::Progress;
 /// `deepfusion weights calibrate`.
 pub(crate) fn run(args: &CalibrateWeightsArgs) -> Result<()> {
     let model = model::named(&args.model)?;
-    // Before the images are looked for.
+    // Before searching for the images.
     int8::check(&model)?;
     let set = args.set.as_deref();
     let options = OpenOptions {

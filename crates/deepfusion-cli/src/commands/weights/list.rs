@@ -4,7 +4,7 @@ use deepfusion_weights::{Card, CardSummary};
 use crate::failure::Result;
 use crate::output;
 
-/// What training starts from without an import, in the same list.
+/// A run, from which training starts without an import, as an entry of the same list.
 const RUN: KnownWeights = KnownWeights {
     name: "a run of this program",
     files: "its folder, last.safetensors or best.safetensors",
@@ -35,7 +35,7 @@ pub(crate) fn run(json: bool) -> Result<()> {
     for network in &networks {
         text += &network_text(&network.card);
     }
-    text += "\nTo be imported, with `weights import`:\n";
+    text += "\nImportable, with `weights import`:\n";
     for known in KNOWN.iter().chain([&RUN]) {
         let KnownWeights {
             name,
@@ -48,10 +48,10 @@ pub(crate) fn run(json: bool) -> Result<()> {
     output::print(&text)
 }
 
-/// A network in lines.
+/// The lines about one network.
 fn network_text(card: &Card) -> String {
     let default = if card.is_default() {
-        " (taken where no --model is given)"
+        " (used if no --model is given)"
     } else {
         ""
     };

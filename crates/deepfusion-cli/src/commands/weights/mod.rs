@@ -1,5 +1,5 @@
-//! `deepfusion weights …`: what is embedded, what can be brought in, and how runs become one,
-//! or a file to embed, and are calibrated for int8.
+//! `deepfusion weights …`: lists embedded and importable networks, imports weights, averages runs, packs a run into a file to embed,
+//! and calibrates one for int8.
 
 pub(super) mod average;
 pub(super) mod calibrate;

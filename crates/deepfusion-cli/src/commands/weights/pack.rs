@@ -27,7 +27,7 @@ pub(crate) fn run(args: &PackArgs) -> Result<()> {
     }
     for path in not_known_as_simulated {
         tracing::warn!(
-            "{}: nothing shows whether its images were simulated; the card says so by your word (--simulated-only)",
+            "{}: it is unknown whether its images were simulated; the card states so only because of --simulated-only",
             path.display()
         );
     }
@@ -41,7 +41,7 @@ pub(crate) fn run(args: &PackArgs) -> Result<()> {
     ));
     if card.bytes > MAX_BYTES {
         tracing::warn!(
-            "{}: larger than the {} MB that are embedded at most; --model takes the file itself all the same",
+            "{}: too large to embed (at most {} MB), but --model can still read the file",
             weights_path.display(),
             MAX_BYTES / 1_000_000
         );
