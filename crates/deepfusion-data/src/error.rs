@@ -470,7 +470,9 @@ pub enum Error {
         first: String,
     },
     /// Frame offsets that form no valid pairs.
-    #[error("frame offsets {offsets:?}: expected at least one, each different from 0 and from the others")]
+    #[error(
+        "frame offsets {offsets:?}: expected at least one, each different from 0 and from the others"
+    )]
     Offsets {
         /// The offsets given.
         offsets: Vec<i32>,

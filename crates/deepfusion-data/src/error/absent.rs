@@ -106,8 +106,7 @@ impl NoTrackReason {
 }
 
 /// How to name a bag's source of speeds.
-const SPEED_TOPIC: &str =
-    "set topics.speed in the file beside the bag to its topic, or read it from CAN frames with [can]";
+const SPEED_TOPIC: &str = "set topics.speed in the file beside the bag to its topic, or read it from CAN frames with [can]";
 
 /// How to get speeds for a recording of this layout.
 fn speeds_from(layout: DatasetKind) -> &'static str {
@@ -133,9 +132,7 @@ fn speeds_from(layout: DatasetKind) -> &'static str {
         DatasetKind::NuScenes => {
             "unpack the data set's metadata again: speeds come from ego_pose.json"
         }
-        DatasetKind::KittiRaw => {
-            "fetch the drive's oxts folder: its speeds make depth metric"
-        }
+        DatasetKind::KittiRaw => "fetch the drive's oxts folder: its speeds make depth metric",
         DatasetKind::Bag => SPEED_TOPIC,
         DatasetKind::Other => "give each frame its time and speed",
     }

@@ -109,9 +109,7 @@ impl CameraProblem {
 #[non_exhaustive]
 pub enum CameraInfoProblem {
     /// The lens model is unknown.
-    #[error(
-        "distortion_model is {name}, expected plumb_bob, rational_polynomial or equidistant"
-    )]
+    #[error("distortion_model is {name}, expected plumb_bob, rational_polynomial or equidistant")]
     Model {
         /// Its name.
         name: String,

@@ -58,9 +58,7 @@ pub enum CanProblem {
         signal: String,
     },
     /// The unit of a speed signal defined in `[can]` is missing.
-    #[error(
-        "can.speed_unit is missing; expected \"m/s\", \"km/h\" or \"mph\""
-    )]
+    #[error("can.speed_unit is missing; expected \"m/s\", \"km/h\" or \"mph\"")]
     NoSpeedUnit,
     /// The steering angle's unit is missing.
     #[error(

@@ -97,7 +97,9 @@ impl ColumnsProblem {
     pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::NoColumn { example, .. } => {
-                return format!("write the names of the columns in the first line, such as {example}");
+                return format!(
+                    "write the names of the columns in the first line, such as {example}"
+                );
             }
             Self::NoRows => "add a row for each measurement",
             Self::NoTimeUnit { .. } => {
@@ -127,7 +129,9 @@ impl ColumnsProblem {
             Self::TimesOfImages { .. } => {
                 "write one line per image, in the order of their names, or use frames.csv, which names each image"
             }
-            Self::Segment(_) => "fetch the segment again: the file should be a NumPy array of numbers",
+            Self::Segment(_) => {
+                "fetch the segment again: the file should be a NumPy array of numbers"
+            }
             Self::Pose(_) => {
                 "repair the file (world_from_cam in four rows of four numbers), or delete it"
             }

@@ -128,7 +128,10 @@ impl fmt::Display for ExpectedValue {
             Self::TimeUpTo(most) => write!(f, ", expected a time above 0 s, at most {most} s"),
             Self::GapUpTo(most) => write!(f, ", but at most {most} s can be bridged"),
             Self::Between(least, most) => {
-                write!(f, ", expected more than {least} and less than {most} degrees")
+                write!(
+                    f,
+                    ", expected more than {least} and less than {most} degrees"
+                )
             }
             Self::SpeedScale => {
                 let (least, most) = (SPEED_SCALES.start(), SPEED_SCALES.end());

@@ -106,7 +106,9 @@ impl Hint for Error {
             Self::NoPath { .. } => {
                 "use KITTI raw with oxts, or a layout with poses (KITTI odometry, KITTI-360, nuScenes, RGB-D folders)"
             }
-            Self::DepthKind { .. } => "use the kind z (camera z), which every recording with depth has",
+            Self::DepthKind { .. } => {
+                "use the kind z (camera z), which every recording with depth has"
+            }
             Self::Missing { part, .. } => part.hint(),
             Self::NoImages { .. } => {
                 "fetch the images, or choose the other camera (2 is left, 3 is right)"
