@@ -346,7 +346,7 @@ mod tests {
         let recorder = TimesWarning::LocalRecorder { model };
         assert_eq!(said((day, day + H / 2)), None);
         assert_eq!(said((day, day + 4 * H)), Some(recorder.clone()));
-        // With an offset of an hour, more of it is within the log.
+        // In the zone one hour off, first more, then less of it is within the log.
         assert_eq!(said((day + 90 * S, day + 2 * H)), Some(recorder));
         assert_eq!(said((day, day + H + 30 * S)), None);
     }
