@@ -360,7 +360,7 @@ fn what_is_wrong_with_a_bag_is_said() {
     );
     assert_eq!(empty.code, 1);
     assert!(
-        empty.stderr.contains("none of its topics holds images"),
+        empty.stderr.contains("none of its topics has images"),
         "{}",
         empty.stderr
     );
@@ -554,7 +554,7 @@ fn a_topic_is_named_by_an_option() {
     let wrong = run(at, "data inspect drive.bag --topic picture=/a");
     assert_eq!(wrong.code, 2);
     assert!(
-        wrong.stderr.contains("`picture` is no role"),
+        wrong.stderr.contains("unknown role `picture`"),
         "{}",
         wrong.stderr
     );
