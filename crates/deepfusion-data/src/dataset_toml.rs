@@ -166,8 +166,8 @@ pub(crate) fn read_or_default<T: serde::de::DeserializeOwned>(path: &Path) -> Re
     })
 }
 
-/// Whether a folder has settings for a recording: its own `dataset.toml`, or one in the folder above that applies to subfolders, even an invalid
-/// one.
+/// Whether a folder has settings for a recording: its own `dataset.toml`, or one in the folder above that applies to subfolders, even an
+/// invalid one.
 #[must_use]
 pub fn has_settings(folder: &Path) -> bool {
     let is_above = |folder: &Path| {
@@ -208,8 +208,8 @@ impl FolderConfig {
         })
     }
 
-    /// A folder's settings for its subfolders. A file without the key `for_folders` may belong to another program or to a recording, so it is ignored.
-    /// A misspelling of the key is an error, like any unknown key in a recording's own file.
+    /// A folder's settings for its subfolders. A file without the key `for_folders` may belong to another program or to a recording, so it
+    /// is ignored. A misspelling of the key is an error, like any unknown key in a recording's own file.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
@@ -306,7 +306,8 @@ impl FolderConfig {
         self.vehicle.speed_scale.unwrap_or(1.0)
     }
 
-    /// The settings for computing the vehicle's motion from its sensors. Speeds are scaled when they are read. `imu` is the inertial unit's mount if none is set.
+    /// The settings for computing the vehicle's motion from its sensors. Speeds are scaled when they are read. `imu` is the inertial unit's
+    /// mount if none is set.
     pub(crate) fn motion(&self, imu: ImuMount) -> MotionConfig {
         let vehicle = &self.vehicle;
         let place = self.vehicle_from_imu.map(|place| ImuMount {

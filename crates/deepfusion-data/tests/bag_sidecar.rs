@@ -101,7 +101,8 @@ fn a_speed_on_the_bus_is_not_mixed_with_a_topics() {
     }
 }
 
-/// A bag with a topic of speeds that is not to be read, according to its file, and the speed on the CAN bus. The setting is kept if the file is written again.
+/// A bag with a topic of speeds that is not to be read, according to its file, and the speed on the CAN bus. The setting is kept if the
+/// file is written again.
 #[test]
 fn no_topic_and_a_signal_do_not_contradict_each_other() {
     let drive = Drive::new(&format!("{INLINE}[topics]\nspeed = \"none\"\n"), |bag| {
@@ -519,8 +520,8 @@ fn a_twist_without_a_yaw_rate_has_a_speed() {
     assert!(open(&now_and_then.bag).unwrap().yaw_known());
 }
 
-/// Rates give the rotation between two images, not the attitude: the integral since the bag's beginning, which grows with a bias or on a ramp, must not
-/// add roll in bends.
+/// Rates give the rotation between two images, not the attitude: the integral since the bag's beginning, which grows with a bias or on a
+/// ramp, must not add roll in bends.
 #[test]
 fn rates_of_roll_and_pitch_tilt_a_pair_alone() {
     let drive = Drive::new("", |bag| {

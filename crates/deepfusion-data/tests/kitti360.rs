@@ -30,7 +30,8 @@ fn world_from_pose(street: &Simulation, frame: usize) -> Se3 {
     shift(1355.0, 3847.0, 115.0) * street.world_from_imu(frame) * pose_from_vehicle().inverse()
 }
 
-/// Writes the street as a drive. The simulator's camera is rectified camera 0; camera 1 is 60 cm to its right, rotated by its rectification.
+/// Writes the street as a drive. The simulator's camera is rectified camera 0; camera 1 is 60 cm to its right, rotated by its
+/// rectification.
 fn write_drive(street: &Simulation, root: &Path, cameras: &[u8]) -> PathBuf {
     let calibration = root.join("calibration");
     let k = street.intrinsics();

@@ -38,8 +38,8 @@ fn file_of(channel: &str, us: f64, ending: &str, keyframe: bool) -> String {
     format!("{place}/{channel}/n015-2018-07-24__{channel}__{us:.0}.{ending}")
 }
 
-/// Writes the street, which has 24 frames per second, as a scene: the even frames are images (12 Hz, every sixth a keyframe), the odd ones scans, which
-/// end 42 ms later. The tables also list another scene, whose files do not exist, and another camera.
+/// Writes the street, which has 24 frames per second, as a scene: the even frames are images (12 Hz, every sixth a keyframe), the odd ones
+/// scans, which end 42 ms later. The tables also list another scene, whose files do not exist, and another camera.
 fn write_scene(street: &Simulation, root: &Path) -> PathBuf {
     let tables = root.join("v1.0-mini");
     let table = |name: &str, rows: &[Value]| {

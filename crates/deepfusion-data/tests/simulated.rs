@@ -56,7 +56,8 @@ fn the_mark_goes_from_layout_to_layout() {
     assert!(!Dataset::all_simulated_at(&root.join("nowhere")));
 }
 
-/// In a date with real and simulated drives, each drive has its own mark, which is kept in another date. Drives without a mark have the date's.
+/// In a date with real and simulated drives, each drive has its own mark, which is kept in another date. Drives without a mark have the
+/// date's.
 #[test]
 fn drives_of_one_date_are_told_apart() {
     let root = tempfile::tempdir().unwrap();

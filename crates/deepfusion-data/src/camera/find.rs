@@ -47,8 +47,8 @@ pub(crate) enum Pictures<'a> {
     Video(&'a Path, Option<&'a GoproLens>),
 }
 
-/// The camera of images of the given size. In order of precedence: given by the caller, given in `dataset.toml`, read from a file beside the images, the
-/// same two in the folder above, described in the `pictures` themselves, assumed. The last two add a warning to `warnings`.
+/// The camera of images of the given size. In order of precedence: given by the caller, given in `dataset.toml`, read from a file beside
+/// the images, the same two in the folder above, described in the `pictures` themselves, assumed. The last two add a warning to `warnings`.
 ///
 /// # Errors
 /// [`Error::NoCameraFile`] if there is none of these; [`Error::CameraFile`], [`Error::Config`].

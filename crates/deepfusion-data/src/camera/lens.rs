@@ -103,8 +103,8 @@ impl Lens {
     }
 
     /// The corrected depth map (camera z, which a lens does not change), with nearest-neighbour interpolation: a
-    /// mean across an edge would be a depth that does not exist. A map with the images' aspect ratio but another size, such as a phone depth
-    /// sensor's, is assumed to cover the whole image.
+    /// mean across an edge would be a depth that does not exist. A map with the images' aspect ratio but another size, such as a phone
+    /// depth sensor's, is assumed to cover the whole image.
     ///
     /// # Errors
     /// [`Error::Size`] if the map's aspect ratio differs from that of the camera's images.

@@ -4,7 +4,8 @@ use deepfusion_geometry::{Distortion, Intrinsics};
 use std::fmt::Write as _;
 
 /// A camera as ROS `camera_info` YAML, which [`crate::CameraCalibration::read`], ROS and most tools read. The model is `equidistant` for a
-/// fisheye lens, `rational_polynomial` if eight coefficients are needed, otherwise `plumb_bob`. Each of `comments` becomes a line at the top.
+/// fisheye lens, `rational_polynomial` if eight coefficients are needed, otherwise `plumb_bob`. Each of `comments` becomes a line at the
+/// top.
 #[must_use]
 pub fn camera_info_yaml(
     name: &str,

@@ -13,9 +13,9 @@ pub const VELOCITY: &str = "velocity_mps/";
 /// Writes the sparse depth of every selected frame that has a scan into a compressed `.npz`, as H×W f32 arrays in metres, 0 = no
 /// depth; returns their number. `progress` is called with (done, total) after each frame.
 ///
-/// The arrays are in the order of the split's lines ([`Dataset::split_places`]), so that predictions without names, which are in that order,
-/// match them. Frames without a place in the split come last, in the order of the data sets. Names are those of [`ground_truth_names`]. A frame
-/// given twice is written once.
+/// The arrays are in the order of the split's lines ([`Dataset::split_places`]), so that predictions without names, which are in that
+/// order, match them. Frames without a place in the split come last, in the order of the data sets. Names are those of
+/// [`ground_truth_names`]. A frame given twice is written once.
 ///
 /// A frame whose scan has radial velocities gets a second array of that size, [`crate::ScanTruth::velocity_mps`], whose name is the
 /// frame's with the prefix [`VELOCITY`].

@@ -92,8 +92,8 @@ fn write_date(
     Ok(names)
 }
 
-/// Writes what KITTI's own files cannot express about a drive: that it is simulated, which of its oxts values were not measured, and that the
-/// camera's mount is assumed.
+/// Writes what KITTI's own files cannot express about a drive: that it is simulated, which of its oxts values were not measured, and that
+/// the camera's mount is assumed.
 fn write_notes(dataset: &Dataset, folder: &Path) -> Result<()> {
     let moves = dataset.track().is_some();
     let notes = [
@@ -191,8 +191,8 @@ fn is_too_slow(dataset: &Dataset) -> bool {
     apart_s.any(|apart_s| apart_s > VehicleTrack::MAX_GAP_S)
 }
 
-/// Writes packets at the times of the recording's own speeds, with their own numbers: packets only at a slow camera's frames would not show how the
-/// vehicle moved between them. KITTI's `sync` drives have one packet per frame, its unsynced ones have packets like these.
+/// Writes packets at the times of the recording's own speeds, with their own numbers: packets only at a slow camera's frames would not show
+/// how the vehicle moved between them. KITTI's `sync` drives have one packet per frame, its unsynced ones have packets like these.
 fn write_own_packets(dataset: &Dataset, data: &Path, moved_s: i64) -> Result<()> {
     let times = dataset.track().map(MotionModel::times_s);
     let mut lines = String::new();

@@ -252,8 +252,8 @@ impl Dataset {
         Ok(image)
     }
 
-    /// Checks that a frame's image can be read, if it is a file of its own. Uses [`deepfusion_images::check_whole`], which takes hardly longer
-    /// than opening the file.
+    /// Checks that a frame's image can be read, if it is a file of its own. Uses [`deepfusion_images::check_whole`], which takes hardly
+    /// longer than opening the file.
     ///
     /// # Errors
     /// Those of [`crate::load_rgb`].

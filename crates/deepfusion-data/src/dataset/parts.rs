@@ -34,8 +34,8 @@ pub struct DatasetParts {
 }
 
 impl DatasetParts {
-    /// The parts of a drive of which only frames, times and speeds are known: the camera looks straight ahead from the vehicle's origin, and turns are
-    /// unknown.
+    /// The parts of a drive of which only frames, times and speeds are known: the camera looks straight ahead from the vehicle's origin,
+    /// and turns are unknown.
     #[must_use]
     pub fn of_frames(name: &str, frames: Vec<Frame>, intrinsics: Intrinsics) -> Self {
         let samples = frames.iter();

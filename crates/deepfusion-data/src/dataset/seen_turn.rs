@@ -12,8 +12,8 @@ pub struct SeenTurn {
     pub to_s: f64,
     /// Change of heading, radians, positive to the left.
     pub yaw_rad: f64,
-    /// Roll (positive with the left side up) and pitch (positive with the nose down) at the later image relative to the earlier one, after the yaw,
-    /// radians.
+    /// Roll (positive with the left side up) and pitch (positive with the nose down) at the later image relative to the earlier one, after
+    /// the yaw, radians.
     pub tilt_rad: [f64; 2],
 }
 

@@ -87,7 +87,8 @@ impl std::fmt::Display for SplitEntry {
     }
 }
 
-/// A drive's name in split files. Names that are numbers lose leading zeros, because the lists for KITTI odometry write sequence `09` as `9`.
+/// A drive's name in split files. Names that are numbers lose leading zeros, because the lists for KITTI odometry write sequence `09` as
+/// `9`.
 pub(crate) fn drive_name(name: &str) -> String {
     let number = !name.is_empty() && name.bytes().all(|b| b.is_ascii_digit());
     match name.trim_start_matches('0') {

@@ -268,8 +268,8 @@ fn zones_min() -> impl Iterator<Item = i64> {
     (-12..=14).map(|hours| 60 * hours).chain(UNEVEN)
 }
 
-/// The beginning of a video in the time zone that puts most of it within the log. If several do, the only one with whole hours is used, since most
-/// have these; `None` if it is not unique.
+/// The beginning of a video in the time zone that puts most of it within the log. If several do, the only one with whole hours is used,
+/// since most have these; `None` if it is not unique.
 fn likeliest(zones: &[InZone]) -> Option<i64> {
     let most_ns = zones.iter().map(|zone| zone.within_ns).max()?;
     let alike = zones.iter().filter(|zone| zone.within_ns == most_ns);
@@ -284,8 +284,8 @@ fn only<T>(mut all: impl Iterator<Item = T>) -> Option<T> {
     all.next().is_none().then_some(first)
 }
 
-/// The frames of a video, kept in the cache folder of `dataset.toml`, otherwise beside the video or, if its folder is not writable, in the user's
-/// cache folder, with a warning.
+/// The frames of a video, kept in the cache folder of `dataset.toml`, otherwise beside the video or, if its folder is not writable, in the
+/// user's cache folder, with a warning.
 ///
 /// # Errors
 /// [`Error::Video`], [`Error::NoPlaceForFrames`].

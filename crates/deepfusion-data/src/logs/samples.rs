@@ -20,10 +20,10 @@ pub(crate) struct Samples {
 }
 
 impl Samples {
-    /// The same samples with steps longer than [`SLOW_S`] filled by linear interpolation: steps of up to `most` seconds, or by default up to
-    /// three times the usual step if that is long, but at most a few seconds. Steps of half a second are filled too, because users of the samples
-    /// interpolate across at most [`MAX_GAP_S`], and rounded times are on both sides of it. Notes are added to the warnings, with the
-    /// samples' name and the setting of `most`.
+    /// The same samples with steps longer than [`SLOW_S`] filled by linear interpolation: steps of up to `most` seconds, or by default up
+    /// to three times the usual step if that is long, but at most a few seconds. Steps of half a second are filled too, because users of
+    /// the samples interpolate across at most [`MAX_GAP_S`], and rounded times are on both sides of it. Notes are added to the warnings,
+    /// with the samples' name and the setting of `most`.
     pub(crate) fn bridged(
         mut self,
         most: Option<f64>,

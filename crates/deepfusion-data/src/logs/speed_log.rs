@@ -54,8 +54,8 @@ impl SpeedLog {
     /// `None` without speeds.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] if a named table is missing, [`crate::Error::Log`] if another program's log cannot be read, [`crate::Error::Columns`] if a
-    /// column or its unit is missing, [`crate::Error::Table`] for an invalid value or a decreasing time.
+    /// [`crate::Error::Config`] if a named table is missing, [`crate::Error::Log`] if another program's log cannot be read,
+    /// [`crate::Error::Columns`] if a column or its unit is missing, [`crate::Error::Table`] for an invalid value or a decreasing time.
     pub(crate) fn read(folder: &Path, config: &FolderConfig) -> Result<Option<Self>> {
         let speed = config.find(folder, "speed", config.speed.as_ref(), &["speed.csv"])?;
         let imu = config.find(folder, "imu", config.imu.as_ref(), &["imu.csv"])?;
@@ -198,7 +198,8 @@ impl SpeedLog {
     }
 }
 
-/// A GPS receiver's measurements other than speed, on the frames' clock: rate of turn of its course (rad/s), and standard deviations of the speeds (m/s).
+/// A GPS receiver's measurements other than speed, on the frames' clock: rate of turn of its course (rad/s), and standard deviations of the
+/// speeds (m/s).
 pub(crate) fn receiver(
     course_rates_radps: Option<&Samples>,
     sigmas_mps: Option<&Samples>,
@@ -310,7 +311,8 @@ fn sigmas(log: &DriveLog, scale: f64) -> Option<Samples> {
     (!ns.is_empty()).then_some(Samples { ns, values })
 }
 
-/// Reads `course.csv`, which `deepfusion-logs` writes for a track of positions. A table of that name without its column is another program's.
+/// Reads `course.csv`, which `deepfusion-logs` writes for a track of positions. A table of that name without its column is another
+/// program's.
 fn course_table(
     folder: &Path,
     config: &FolderConfig,

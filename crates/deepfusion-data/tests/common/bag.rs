@@ -201,8 +201,8 @@ impl TinyBag {
         })
     }
 
-    /// Adds a GPS receiver's velocity, east (x) and north (y), with a constant speed, m/s, and a course in radians, counter-clockwise from east,
-    /// as a function of the message's number.
+    /// Adds a GPS receiver's velocity, east (x) and north (y), with a constant speed, m/s, and a course in radians, counter-clockwise from
+    /// east, as a function of the message's number.
     pub(crate) fn course_twist(
         &mut self,
         topic: &str,
@@ -288,8 +288,8 @@ impl TinyBag {
         self
     }
 
-    /// Adds an odometry without a twist: on a circle to the left, starting along the world's x, at a speed (m/s) and a yaw rate (rad/s), with its
-    /// heading rotated by an angle (radians) from the direction of travel.
+    /// Adds an odometry without a twist: on a circle to the left, starting along the world's x, at a speed (m/s) and a yaw rate (rad/s),
+    /// with its heading rotated by an angle (radians) from the direction of travel.
     pub(crate) fn poses(
         &mut self,
         topic: &str,

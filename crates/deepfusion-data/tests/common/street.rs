@@ -79,7 +79,8 @@ pub(crate) fn check_mount(dataset: &Dataset, street: &Simulation) {
 /// are those of the unit above the rear axle.
 ///
 /// With a jerk of up to a few m/s³, a central difference at 10 Hz is off by jerk · (0.1 s)² / 6, below 1 cm/s, and by as much again for
-/// the vehicle's bounce, which the speed does not include. The arc includes neither bounce (1.5 cm within about a second, 1 cm per frame) nor slip.
+/// the vehicle's bounce, which the speed does not include. The arc includes neither bounce (1.5 cm within about a second, 1 cm per frame)
+/// nor slip.
 pub(crate) fn check_motion(
     dataset: &Dataset,
     street: &Simulation,
@@ -137,8 +138,8 @@ fn heading_rate(street: &Simulation, frame: usize) -> f64 {
     (heading(after) - heading(before)) / (street.time_s(after) - street.time_s(before))
 }
 
-/// Compares a frame's ground truth from the scan with the simulator's exact depth. The scanner has another viewpoint, so at silhouettes a pixel may
-/// have the depth of the background, and its ranges have a noise of 2 cm. So most pixels agree to 2 %, but not all.
+/// Compares a frame's ground truth from the scan with the simulator's exact depth. The scanner has another viewpoint, so at silhouettes a
+/// pixel may have the depth of the background, and its ranges have a noise of 2 cm. So most pixels agree to 2 %, but not all.
 pub(crate) fn check_truth(dataset: &Dataset, index: usize, exact: &deepfusion_geometry::DepthMap) {
     let truth = dataset.ground_truth(index, GtKind::Z).unwrap().unwrap();
     assert_eq!((truth.width, truth.height), (exact.width, exact.height));

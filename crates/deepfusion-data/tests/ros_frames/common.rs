@@ -32,7 +32,8 @@ pub(super) fn says(text: &str, parts: &[&str]) {
     }
 }
 
-/// The rotation from a camera's axes (right, down, forward) to a body's (forward, left, up), as an axis-angle vector: 120° about (-1, 1, -1)/√3.
+/// The rotation from a camera's axes (right, down, forward) to a body's (forward, left, up), as an axis-angle vector: 120° about (-1, 1,
+/// -1)/√3.
 pub(super) const OPTICAL: [f64; 3] = [
     -1.209_199_576_156_145,
     1.209_199_576_156_145,

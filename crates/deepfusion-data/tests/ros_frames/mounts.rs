@@ -196,7 +196,8 @@ fn a_camera_that_pans_has_no_mount() {
     is_near(&camera(&still.opened()).0, [1.0, 0.0, 1.0]);
 }
 
-/// A scan whose point is measured 40 ms after the time in its header, at 10 m/s; according to the file, its driver does not compensate for motion.
+/// A scan whose point is measured 40 ms after the time in its header, at 10 m/s; according to the file, its driver does not compensate for
+/// motion.
 #[test]
 fn a_point_with_a_time_of_its_own_is_brought_to_the_frame_from_there() {
     let depth = |sidecar: &str, after_s: f32| {

@@ -64,8 +64,8 @@ impl Dataset {
     }
 
     /// Adds the vehicle's turns estimated from its images, in the order of time: roll and pitch, and also yaw if no yaw rate was
-    /// recorded. Does nothing if roll and pitch [are known](Self::tilt_unknown), if no turns are given, or if there is no yaw rate and turns
-    /// are missing for a tenth of the pairs that moved, because a yaw with gaps is of no use.
+    /// recorded. Does nothing if roll and pitch [are known](Self::tilt_unknown), if no turns are given, or if there is no yaw rate and
+    /// turns are missing for a tenth of the pairs that moved, because a yaw with gaps is of no use.
     pub fn take_turns(&mut self, turns: &[SeenTurn]) {
         let yaw_known = self.parts.yaw_known;
         let enough = yaw_known || self.shows_enough(turns);

@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 /// is true for an assumed camera.
 ///
 /// # Errors
-/// [`Error::NoBagCamera`] if there is none of these, [`Error::CameraFile`] if the camera is invalid, [`Error::FrameSize`] if its size differs
-/// from that of the first image.
+/// [`Error::NoBagCamera`] if there is none of these, [`Error::CameraFile`] if the camera is invalid, [`Error::FrameSize`] if its size
+/// differs from that of the first image.
 pub(super) fn find(
     messages: &dyn MessageSource,
     topics: &Topics,

@@ -214,8 +214,8 @@ impl Index {
             .push(MotionWarning::WorldAxes { topic }.into());
     }
 
-    /// Leaves out an inertial unit without angular rates: its zeros do not mean a straight drive, nor does a constant rate that is marked as
-    /// missing. Some drivers publish gyroscope and accelerometer as separate topics, others only fill in the accelerations.
+    /// Leaves out an inertial unit without angular rates: its zeros do not mean a straight drive, nor does a constant rate that is marked
+    /// as missing. Some drivers publish gyroscope and accelerometer as separate topics, others only fill in the accelerations.
     fn leave_out_rateless(&mut self, topics: &Topics) {
         let Some(topic) = topics.of(TopicRole::Imu) else {
             return;

@@ -89,7 +89,8 @@ pub(super) fn packet<'m>(
     }
 }
 
-/// Whether a packet has the layout of ROS 1's first version. Both layouts have the same name, so it is recognised by its MD5, which ROS 2 does not have.
+/// Whether a packet has the layout of ROS 1's first version. Both layouts have the same name, so it is recognised by its MD5, which ROS 2
+/// does not have.
 fn is_old(message: &Message<'_>) -> bool {
     message.serialization() == Serialization::Ros1 && message.is::<OldFfmpegPacket<'_>>()
 }

@@ -163,8 +163,8 @@ impl Scan {
         Some(ground_radial(&self.xyz, radial, &velocity))
     }
 
-    /// The scan projected into a camera; the nearest point wins a pixel. `cam_from_lidar` takes seconds after the scan's time, and gives the
-    /// transform from the LiDAR at that time to the camera at the frame's time.
+    /// The scan projected into a camera; the nearest point wins a pixel. `cam_from_lidar` takes seconds after the scan's time, and gives
+    /// the transform from the LiDAR at that time to the camera at the frame's time.
     pub(super) fn seen(&self, cam_from_lidar: impl Fn(f64) -> Se3, k: &Intrinsics) -> SeenScan {
         let (width, height) = (k.width as usize, k.height as usize);
         let mut depth = DepthMap::empty(width, height);

@@ -139,8 +139,8 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
     }
 }
 
-/// The rates of roll and pitch with their times. They are only integrated between two frames: integrated from the beginning, their bias would tilt the
-/// vehicle, and so would turns on a ramp.
+/// The rates of roll and pitch with their times. They are only integrated between two frames: integrated from the beginning, their bias
+/// would tilt the vehicle, and so would turns on a ramp.
 fn tilt_rates(index: &Index, origin_ns: i64) -> Vec<(f64, [f64; 2])> {
     let mut rates = index.tilt_rates.clone();
     rates.sort_by_key(|(ns, _)| *ns);

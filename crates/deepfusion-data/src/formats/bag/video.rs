@@ -80,7 +80,8 @@ impl BagVideo {
     }
 }
 
-/// Path of the folder for decoded frames: `<bag>.<topic>.frames` beside the bag, or, with a hash of its path, in the cache folder of the file beside it.
+/// Path of the folder for decoded frames: `<bag>.<topic>.frames` beside the bag, or, with a hash of its path, in the cache folder of the
+/// file beside it.
 fn cache(bag: &Path, topic: &str, config: &BagConfig) -> PathBuf {
     let beside = bag.parent().unwrap_or(Path::new("."));
     let folder = config.cache.as_ref();

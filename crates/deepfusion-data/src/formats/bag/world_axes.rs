@@ -8,9 +8,9 @@ const ACROSS: f64 = 0.3;
 /// The same ratio for 44°, which does not occur anywhere on a vehicle for long.
 const FAR_ACROSS: f64 = 0.7;
 
-/// Whether velocities (x, y; m/s) are in axes other than the vehicle's: of those that are fast enough, a quarter points far from x and some point
-/// very far from it, or most point far from it. Two thirds of all headings are far from x, but streets may run east and west for most of a drive. In a
-/// car park, the velocity at a vehicle's front is often far from x, but never very far.
+/// Whether velocities (x, y; m/s) are in axes other than the vehicle's: of those that are fast enough, a quarter points far from x and some
+/// point very far from it, or most point far from it. Two thirds of all headings are far from x, but streets may run east and west for most
+/// of a drive. In a car park, the velocity at a vehicle's front is often far from x, but never very far.
 pub(super) fn are_world_axes(velocities: impl Iterator<Item = (f64, f64)>) -> bool {
     let across = velocities.filter_map(|(x, y)| {
         let speed = x.hypot(y);

@@ -48,7 +48,8 @@ pub(super) struct DriveConfig {
     pub(super) mount_known: bool,
 }
 
-/// Whether the drive in a folder is simulated, according to `dataset.toml` in that folder, otherwise in its date's. `None` if neither sets it or can be read.
+/// Whether the drive in a folder is simulated, according to `dataset.toml` in that folder, otherwise in its date's. `None` if neither sets
+/// it or can be read.
 pub(super) fn says_simulated(drive: &Path) -> Option<bool> {
     Keys::of(drive).ok()?.simulated
 }

@@ -54,8 +54,8 @@ impl Drive {
         numbered_files(&data, &["jpeg", "jpg", "png"])
     }
 
-    /// Whether the drive is simulated: according to its own `dataset.toml`, otherwise its date's; if neither sets it, the drive is simulated if it has
-    /// the exact poses and the exact masks of dynamic objects that only `simulate` can write.
+    /// Whether the drive is simulated: according to its own `dataset.toml`, otherwise its date's; if neither sets it, the drive is
+    /// simulated if it has the exact poses and the exact masks of dynamic objects that only `simulate` can write.
     #[must_use]
     pub fn is_simulated(&self) -> bool {
         /// Name of the file with exact poses.

@@ -75,8 +75,8 @@ impl OxtsPacket {
 }
 
 /// Reads the packets of an `oxts` folder as a track of forward speed (`vf`), yaw rate (`wz`), roll and pitch over time in
-/// seconds from `origin_ns`. Missing packets leave a gap. If all packets have exactly zero roll and pitch but non-zero rates (`wx`, `wy`), as
-/// in converted drives whose vehicle only measured rates, the track has the rates instead.
+/// seconds from `origin_ns`. Missing packets leave a gap. If all packets have exactly zero roll and pitch but non-zero rates (`wx`, `wy`),
+/// as in converted drives whose vehicle only measured rates, the track has the rates instead.
 ///
 /// # Errors
 /// [`Error::Missing`] without the folder, its time stamps or any packet; [`Error::TimeStamp`],

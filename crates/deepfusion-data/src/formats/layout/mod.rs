@@ -22,7 +22,8 @@ impl Dataset {
     /// Opens a recording of any known layout, which is recognised by its files. A KITTI raw drive, date or root gives one data set for
     /// each drive and camera, in order of names; KITTI odometry one for each sequence, KITTI-360 one for each drive, nuScenes one for
     /// each scene. A bag, a folder of images, a video file, a comma2k19 segment and a folder of RGB-D frames give one. A folder of such recordings whose
-    /// `dataset.toml` has `for_folders = true` gives those of each. Drives without images of the camera, or without a selected frame, are left out.
+    /// `dataset.toml` has `for_folders = true` gives those of each. Drives without images of the camera, or without a selected frame, are
+    /// left out.
     ///
     /// The sizes of all images are checked against the calibration. Times and speeds may be missing
     /// (evaluation needs neither), but must be readable if they exist. If something else in the folder looks like a recording, the

@@ -1,7 +1,8 @@
 //! Reads nuScenes: JSON tables in `v1.0-mini` (`-trainval`, `-test`), files in `samples` and `sweeps` beside it.
 //!
 //! A scene is a data set of the front camera's images, keyframes and sweeps ordered by time. Every image and scan has the vehicle's pose
-//! at its time. These poses move a scan to the time of an image, and speed and yaw rate are computed from those of the camera and the LiDAR.
+//! at its time. These poses move a scan to the time of an image, and speed and yaw rate are computed from those of the camera and the
+//! LiDAR.
 
 mod rows;
 mod tables;

@@ -5,8 +5,8 @@ use deepfusion_video::{frames_folder, holds_frames_of};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The video's own folder, or one in the user's cache folder if the former is not writable (a memory card, a network share). This is checked
-/// before hours of work, without writing anything, since inspecting a recording may never need its frames.
+/// The video's own folder, or one in the user's cache folder if the former is not writable (a memory card, a network share). This is
+/// checked before hours of work, without writing anything, since inspecting a recording may never need its frames.
 ///
 /// # Errors
 /// [`Error::NoPlaceForFrames`] if neither is writable.

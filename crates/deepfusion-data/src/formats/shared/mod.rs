@@ -1,5 +1,5 @@
-//! Code shared by several layouts: listing files, poses and the motion computed from them, and the recording used by all layouts except bags
-//! and KITTI raw.
+//! Code shared by several layouts: listing files, poses and the motion computed from them, and the recording used by all layouts except
+//! bags and KITTI raw.
 
 pub(super) mod files;
 pub(super) mod frames_place;

@@ -84,9 +84,9 @@ pub(crate) fn speed_log(path: &Path, world_from_vehicle: &[(i64, Se3)]) -> Speed
     }
 }
 
-/// The transform from the vehicle to a camera of which only the position is known (`vehicle_in_cam`: the vehicle's origin in the camera, metres).
-/// The vehicle's forward axis is the direction in which its origin moves, and its left axis is level with the camera. If the path is too short, the
-/// camera is assumed to look straight ahead.
+/// The transform from the vehicle to a camera of which only the position is known (`vehicle_in_cam`: the vehicle's origin in the camera,
+/// metres). The vehicle's forward axis is the direction in which its origin moves, and its left axis is level with the camera. If the path
+/// is too short, the camera is assumed to look straight ahead.
 pub(crate) fn cam_from_vehicle(world_from_cam: &[Se3], vehicle_in_cam: Vector3<f64>) -> Se3 {
     let (mut forward, mut way_m) = (Vector3::zeros(), 0.0);
     for pair in world_from_cam.windows(2) {

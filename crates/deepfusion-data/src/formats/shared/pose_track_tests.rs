@@ -41,8 +41,8 @@ fn a_parabola_is_exact_for_constant_acceleration() {
     assert!(turns.iter().all(|w| w.abs() < 1e-9), "{turns:?}");
 }
 
-/// Central differences on a circle: the chord over 2h instead of the arc is too short by a fraction of (ωh)²/6; at the ends, with a parabola
-/// through one side, by twice that. The heading is linear in time, so its slope is exact.
+/// Central differences on a circle: the chord over 2h instead of the arc is too short by a fraction of (ωh)²/6; at the ends, with a
+/// parabola through one side, by twice that. The heading is linear in time, so its slope is exact.
 #[test]
 fn a_circle_is_found_to_the_second_order() {
     let (r, speed, h) = (12.0, 6.0, 0.1);
@@ -70,7 +70,8 @@ fn a_circle_is_found_to_the_second_order() {
     );
 }
 
-/// A world with z down or camera axes gives the same motions, since these are relative to the vehicle. A heading that passes half a turn does not jump.
+/// A world with z down or camera axes gives the same motions, since these are relative to the vehicle. A heading that passes half a turn
+/// does not jump.
 #[test]
 fn the_world_s_axes_do_not_matter() {
     let times: Vec<f64> = (0..80).map(|i| f64::from(i) * 0.1).collect();
