@@ -296,7 +296,7 @@ def test_what_a_recording_lacks_can_be_given(drive, tmp_path):
         assert deepfusion.doctor(folder)["drives"] == []
     for wrong, said in [
         ({"topics": {"image": ""}}, "topics"),
-        ({"topics": {"pictures": "/a"}}, "no role"),
+        ({"topics": {"pictures": "/a"}}, "unknown role"),
         ({"hfov_deg": 90, "intrinsics": camera}, "hfov_deg"),
     ]:
         with pytest.raises(ValueError, match=said):

@@ -65,7 +65,7 @@ fn a_log_beside_its_images_is_a_drive() {
     assert!(!said.stderr.contains("still to do"), "{}", said.stderr);
     let no_camera = "data import torque.csv --zone +01:00 --images images --out no-camera";
     let said = ok(at, no_camera).stderr;
-    assert!(said.contains("nothing says what its camera is"), "{said}");
+    assert!(said.contains("no calibration of its camera"), "{said}");
     assert!(said.contains("hfov_deg = 70"), "{said}");
     fs::copy(at.join("frames.csv"), at.join("drive/frames.csv")).unwrap();
     let imported = json(at, "data inspect drive --json");
@@ -87,7 +87,7 @@ fn a_log_beside_its_images_is_a_drive() {
     let beside = json(at, "data inspect beside --json");
     assert!((mean(&beside) - mean(&imported)).abs() < 1e-4);
     let warnings = beside["drives"][0]["remarks"].to_string();
-    assert!(warnings.contains("taken for UTC"), "{warnings}");
+    assert!(warnings.contains("assuming UTC"), "{warnings}");
 
     // The camera by its field of view, 160 pixels of 90 degrees; as an option, too.
     let import_by_view = "data import torque.csv --zone +01:00 --images images";

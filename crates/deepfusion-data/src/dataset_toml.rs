@@ -1,4 +1,4 @@
-//! `dataset.toml`: what a recording's own files do not say.
+//! `dataset.toml`: settings for what is missing from a recording's own files.
 
 use crate::{ConfigProblem, Error, ExpectedValue, OpenOptions, Result};
 use deepfusion_geometry::{HFOV_DEG, Se3};
@@ -7,94 +7,94 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// Longest gap between speeds that can be asked to be bridged, in seconds: nobody knows how a car drove for longer.
+/// Largest allowed `max_gap_s`, in seconds: across longer gaps between speeds, interpolation is meaningless.
 pub(crate) const MOST_GAP_S: f64 = 60.0;
 
 /// A recording's `dataset.toml`. Every key is optional; docs/reference/dataset-toml.md lists them.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FolderConfig {
-    /// Folder of the images.
+    /// Path of the folder of images.
     pub(crate) images: Option<PathBuf>,
-    /// The video file.
+    /// Path of the video.
     pub(crate) video: Option<PathBuf>,
-    /// Where a video's frames are kept once decoded.
+    /// Path of the folder for a video's decoded frames.
     pub(crate) cache: Option<PathBuf>,
-    /// The table of speeds.
+    /// Path of the table or log of speeds.
     pub(crate) speed: Option<PathBuf>,
-    /// The column of times of another program's table, by its header.
+    /// Header of the column of times in another program's table.
     pub(crate) time_column: Option<String>,
-    /// The column of speeds of another program's table; the signal of a CAN trace.
+    /// Header of the column of speeds in another program's table, or the signal in a CAN trace.
     pub(crate) speed_column: Option<String>,
-    /// What the frames of a CAN trace hold.
+    /// Path of the DBC file with the signals of a CAN trace.
     pub(crate) dbc: Option<PathBuf>,
-    /// Longest time between two speeds that is bridged, in seconds.
+    /// Longest gap between two speeds that is bridged, in seconds.
     pub(crate) max_gap_s: Option<f64>,
-    /// The table of the IMU.
+    /// Path of the IMU's table.
     pub(crate) imu: Option<PathBuf>,
-    /// The calibration file.
+    /// Path of the calibration file.
     pub(crate) calibration: Option<PathBuf>,
     /// fx, fy, cx, cy of a camera without distortion.
     pub(crate) intrinsics: Option<[f64; 4]>,
-    /// The field of view from left to right of a camera without distortion, in degrees.
+    /// Horizontal field of view of a camera without distortion, in degrees.
     pub(crate) hfov_deg: Option<f64>,
-    /// Frames a second, where nothing says the frames' times.
+    /// Frames per second, if the frames have no times.
     pub(crate) fps: Option<f64>,
     /// The first frame's time on the speeds' clock, in seconds, for frames whose times count from 0.
     pub(crate) start_s: Option<f64>,
-    /// Unit of columns of time without one.
+    /// Unit of columns of times without a unit in their header.
     pub(crate) time_unit: Option<String>,
-    /// Unit of a column `speed` without one.
+    /// Unit of a speed column without a unit in its header.
     pub(crate) speed_unit: Option<String>,
-    /// Unit of a yaw rate's column without one.
+    /// Unit of a yaw rate column without a unit in its header.
     pub(crate) yaw_rate_unit: Option<String>,
-    /// Folder of the depth images.
+    /// Path of the folder of depth images.
     pub(crate) depth: Option<PathBuf>,
-    /// Metres of one step of a depth image.
+    /// Metres per unit of the depth images' values.
     pub(crate) depth_unit_m: Option<f64>,
-    /// A value of the depth images, besides 0, that means none.
+    /// A value in the depth images, besides 0, that means no depth.
     pub(crate) depth_invalid: Option<u16>,
-    /// Whether the images are a simulator's.
+    /// Whether the recording is simulated.
     #[serde(default)]
     pub(crate) simulated: bool,
-    /// Where the camera is on the vehicle.
+    /// The camera's mount on the vehicle.
     pub(crate) mount: Option<Mount>,
-    /// A point of the inertial unit in the vehicle.
+    /// The transform from the inertial unit to the vehicle.
     pub(crate) vehicle_from_imu: Option<ImuPlace>,
-    /// The vehicle's geometry.
+    /// The vehicle's geometry and speed scale.
     #[serde(default)]
     pub(crate) vehicle: Vehicle,
     /// The camera's clock.
     #[serde(default)]
     pub(crate) clock: Clock,
-    /// Whether what is said here is said of the recordings in the folders here, too, where their own files say nothing.
+    /// Whether these settings also apply to the recordings in the subfolders, where their own files do not set a key.
     #[serde(default)]
     pub(crate) for_folders: bool,
-    /// Where the file is.
+    /// Path of this file.
     #[serde(skip)]
     pub(crate) path: PathBuf,
-    /// The one in the folder above, where that is for the folders there.
+    /// The file in the folder above, if it applies to subfolders.
     #[serde(skip)]
     pub(crate) above: Option<Box<FolderConfig>>,
 }
 
-/// The camera's place on the vehicle: x forward, y left, z up from where the speed is measured (the rear
-/// axle for wheel speeds), in metres; its turns in degrees.
+/// The camera's mount on the vehicle: position x forward, y left, z up from where the speed is measured (the rear
+/// axle for wheel speeds), in metres; orientation in degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Mount {
     forward_m: f64,
     left_m: f64,
     up_m: f64,
-    /// To the left.
+    /// Yaw, positive to the left.
     yaw_deg: f64,
-    /// Down.
+    /// Pitch, positive down.
     pitch_deg: f64,
-    /// To the right: clockwise as the camera looks.
+    /// Roll, positive to the right (clockwise in the viewing direction).
     roll_deg: f64,
 }
 
-/// The inertial unit's place on the vehicle (x forward, y left, z up): metres, and an axis-angle vector in radians.
+/// The inertial unit's mount on the vehicle (x forward, y left, z up): translation in metres, rotation as an axis-angle vector in radians.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct ImuPlace {
@@ -102,27 +102,27 @@ pub(crate) struct ImuPlace {
     rotation: [f64; 3],
 }
 
-/// What of a vehicle its steering angle needs to tell a turn.
+/// What is needed of a vehicle to compute turns from its steering angle, and to correct its speed.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Vehicle {
     wheelbase_m: Option<f64>,
-    /// Steering wheel's angle over road wheels'.
+    /// Angle of the steering wheel / angle of the road wheels.
     steering_ratio: Option<f64>,
     steering_offset_rad: f64,
-    /// True speed over the vehicle's: worn tyres read too fast.
+    /// True speed / measured speed: worn tyres give too high a speed.
     pub(crate) speed_scale: Option<f64>,
 }
 
-/// The camera's clock against the vehicle's.
+/// The camera's clock relative to the vehicle's.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Clock {
-    /// How far the camera's clock is ahead of the vehicle's, in seconds; taken off the images' times.
+    /// How far the camera's clock is ahead of the vehicle's, in seconds; subtracted from the images' times.
     pub(crate) camera_ahead_s: f64,
 }
 
-/// What is wrong with a `vehicle.speed_scale`.
+/// The error about a `vehicle.speed_scale` outside its range.
 pub(crate) fn bad_speed_scale(scale: f64) -> ConfigProblem {
     ConfigProblem::Value {
         key: "vehicle.speed_scale",
@@ -131,7 +131,7 @@ pub(crate) fn bad_speed_scale(scale: f64) -> ConfigProblem {
     }
 }
 
-/// What is wrong with a clock or a scale of the speed, if something is.
+/// Checks the ranges of the clock's offset and the speed scale.
 pub(crate) fn check_clock_and_scale(
     clock: Clock,
     speed_scale: Option<f64>,
@@ -150,7 +150,7 @@ pub(crate) fn check_clock_and_scale(
     }
 }
 
-/// A TOML file's settings; where there is no such file, those of an empty one.
+/// A TOML file's settings; those of an empty file if it does not exist.
 ///
 /// # Errors
 /// [`Error::Config`], [`Error::File`].
@@ -166,8 +166,8 @@ pub(crate) fn read_or_default<T: serde::de::DeserializeOwned>(path: &Path) -> Re
     })
 }
 
-/// Whether a folder has settings as a recording: its own `dataset.toml`, or one in the folder above that is for the folders there, whatever is wrong with
-/// it.
+/// Whether a folder has settings for a recording: its own `dataset.toml`, or one in the folder above that applies to subfolders, even an
+/// invalid one.
 #[must_use]
 pub fn has_settings(folder: &Path) -> bool {
     let is_above = |folder: &Path| {
@@ -178,14 +178,14 @@ pub fn has_settings(folder: &Path) -> bool {
         || std::path::absolute(folder).is_ok_and(|folder| is_above(&folder))
 }
 
-/// Whether a line of TOML sets the key `for_folders`, or one that was meant to be it: `for_folder`, `for-folders`.
+/// Whether a line of TOML sets the key `for_folders`, or a misspelling of it, such as `for_folder` or `for-folders`.
 fn is_for_folders(line: &str) -> bool {
     let Some((key, _)) = line.split_once('=') else {
         return false;
     };
     let letters = key.chars().filter(|c| c.is_ascii_alphabetic() || *c == '#');
     let key = letters.collect::<String>().to_ascii_lowercase();
-    // Not `format_folder`, which may stand in another program's file.
+    // Exclude `format_folder`, which another program's file may contain.
     let of = key.strip_prefix("for").unwrap_or_default();
     ["fold", "allfold", "subfold"]
         .iter()
@@ -195,7 +195,7 @@ fn is_for_folders(line: &str) -> bool {
 impl FolderConfig {
     pub(crate) const NAME: &str = "dataset.toml";
 
-    /// Reads `dataset.toml` in a folder, and the one in the folder above where that is for the folders there; without one, nothing is said.
+    /// Reads `dataset.toml` in a folder, and the one in the folder above if it applies to subfolders. Without any file, no key is set.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
@@ -208,8 +208,8 @@ impl FolderConfig {
         })
     }
 
-    /// The settings of a folder for the folders in it. A file that has no such key may be another program's, or of a recording: it is not looked at.
-    /// One with a key that is nearly this is: the key is then an error, as an unknown one of a recording's own file is.
+    /// A folder's settings for its subfolders. A file without the key `for_folders` may belong to another program or to a recording, so it
+    /// is ignored. A misspelling of the key is an error, like any unknown key in a recording's own file.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
@@ -222,8 +222,8 @@ impl FolderConfig {
         Ok(Some(config).filter(|config| config.for_folders))
     }
 
-    /// With what the file above says of everything that is not said here, but for what is a single recording's: its files, its clocks, whether
-    /// it is simulated. The camera is looked for above by `find_camera`, as a calibration here goes before it.
+    /// These settings, completed by those of the file above, except for settings of a single recording: its files, its clocks, whether
+    /// it is simulated. `find_camera` looks for the camera above by itself, because a calibration file here takes precedence.
     fn completed(self, above: Self) -> Self {
         let text = |own: Option<String>, above: &Option<String>| own.or_else(|| above.clone());
         let own_vehicle = self.vehicle != Vehicle::default();
@@ -249,7 +249,7 @@ impl FolderConfig {
         }
     }
 
-    /// Reads the file of a folder alone.
+    /// Reads only the folder's own file.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
@@ -296,17 +296,18 @@ impl FolderConfig {
         }
     }
 
-    /// How far the camera's clock is ahead of the vehicle's, in seconds: as it is given, else as this file says.
+    /// How far the camera's clock is ahead of the vehicle's, in seconds: from the options, otherwise from this file.
     pub(crate) fn camera_ahead_s(&self, options: &OpenOptions) -> f64 {
         options.camera_ahead_s.unwrap_or(self.clock.camera_ahead_s)
     }
 
-    /// True speed over the vehicle's.
+    /// True speed / measured speed.
     pub(crate) fn speed_scale(&self) -> f64 {
         self.vehicle.speed_scale.unwrap_or(1.0)
     }
 
-    /// How the vehicle's sensors become its motion (the speeds are scaled where they are read); `imu` is where the inertial unit is taken to be where nothing says it.
+    /// The settings for computing the vehicle's motion from its sensors. Speeds are scaled when they are read. `imu` is the inertial unit's
+    /// mount if none is set.
     pub(crate) fn motion(&self, imu: ImuMount) -> MotionConfig {
         let vehicle = &self.vehicle;
         let place = self.vehicle_from_imu.map(|place| ImuMount {
@@ -343,15 +344,15 @@ impl FolderConfig {
         })
     }
 
-    /// The folder that it lies in.
+    /// The folder that contains this file.
     pub(crate) fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new("."))
     }
 
-    /// A file that is named here, or is there under a usual name. A named one must be there.
+    /// The file named here, which must exist, or else the first existing one of the usual names.
     ///
     /// # Errors
-    /// [`Error::Config`] where a named one is not.
+    /// [`Error::Config`] if a named file does not exist.
     pub(crate) fn find(
         &self,
         folder: &Path,
@@ -371,10 +372,10 @@ impl FolderConfig {
         Ok(paths.find(|path| path.exists()))
     }
 
-    /// The files and folders that are named here, of a recording in this folder, whether they are there or not.
+    /// All files and folders that are named here, for a recording in this folder, whether or not they exist.
     pub(crate) fn places(&self, folder: &Path) -> Vec<PathBuf> {
         let video = self.video.as_ref().map(|named| folder.join(named));
-        // A cache is named from where the video lies.
+        // The cache's path is relative to the video's folder.
         let beside = video.as_deref().and_then(Path::parent).unwrap_or(folder);
         let cache = self.cache.as_ref().map(|named| beside.join(named));
         let others = [
@@ -389,15 +390,15 @@ impl FolderConfig {
         others.chain(cache).chain(video).collect()
     }
 
-    /// A point of the vehicle in the camera; looking straight ahead at the vehicle's origin where nothing
-    /// is said (the camera then moves as the vehicle does).
+    /// The transform from the vehicle to the camera. Without a mount, the camera looks straight ahead from the
+    /// vehicle's origin, so that it moves like the vehicle.
     pub(crate) fn cam_from_vehicle(&self) -> Se3 {
         self.mount.unwrap_or_default().cam_from_vehicle()
     }
 }
 
 impl Mount {
-    /// Its numbers by their keys.
+    /// Its numbers, with their keys.
     fn numbers(&self) -> [(&'static str, f64); 6] {
         [
             ("mount.forward_m", self.forward_m),
@@ -410,9 +411,9 @@ impl Mount {
     }
 
     fn cam_from_vehicle(&self) -> Se3 {
-        // The camera's axes in the vehicle's: x is right (-y), y is down (-z), z is ahead (x).
+        // The camera's axes in the vehicle's: x right (-y), y down (-z), z forward (x).
         let ahead = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
-        // About x, y, z of the vehicle, roll first: nose down is positive about y (left).
+        // About x, y, z of the vehicle, roll first; nose down is positive about y (left).
         let turn = Rotation3::from_euler_angles(
             self.roll_deg.to_radians(),
             self.pitch_deg.to_radians(),

@@ -9,7 +9,7 @@ fn read(text: &str) -> Result<FolderConfig> {
 #[test]
 fn a_mounted_camera_sees_ahead() {
     let config = read("[mount]\nforward_m = 1.5\nup_m = 1.2\n").unwrap();
-    // A stone 10 m before the axle and 1 m to its left lies 8.5 m ahead, to the left, 1.2 m below.
+    // A stone 10 m ahead of the axle and 1 m to its left is 8.5 m ahead of the camera, to the left, 1.2 m below.
     let seen = config
         .cam_from_vehicle()
         .transform(&Vector3::new(10.0, 1.0, 0.0));
@@ -27,12 +27,12 @@ fn angles_turn_the_way_they_say() {
             .cam_from_vehicle()
             .transform(&Vector3::new(10.0, 0.0, 0.0))
     };
-    // What is ahead of the car appears to the right of a camera that looks left, above one that looks
-    // down, and stays put under roll.
+    // A point ahead of the vehicle appears further right if the camera looks left, higher if it looks
+    // down, and in the same place if it rolls.
     assert!(ahead("yaw_deg").x > 1.0);
     assert!(ahead("pitch_deg").y < -1.0);
     assert!((ahead("roll_deg") - Vector3::new(0.0, 0.0, 10.0)).norm() < 1e-12);
-    // Rolled to the right, what is to the right moves up in the image.
+    // If the camera rolls to the right, a point on the right moves up in the image.
     let config = read("[mount]\nroll_deg = 10\n").unwrap();
     assert!(
         config
@@ -47,7 +47,7 @@ fn angles_turn_the_way_they_say() {
 fn mistakes_are_named() {
     for (text, problem) in [
         ("fsp = 10", "unknown field `fsp`"),
-        ("fps = 0", "fps is 0, it must be above 0"),
+        ("fps = 0", "fps is 0, expected a number above 0"),
         ("fps = 'fast'", "fps"),
         ("intrinsics = [1, 2, 3]", "intrinsics"),
         ("start_s = nan", "start_s is NaN"),
@@ -66,11 +66,11 @@ fn mistakes_are_named() {
         error
             .unwrap_err()
             .to_string()
-            .contains("speed: there is no")
+            .contains("gone.csv does not exist")
     );
 }
 
-/// Reads the file of a drive in a folder that has one, too.
+/// Reads the file of a drive, with another file in the folder above.
 fn read_below(above: &str, own: &str) -> Result<FolderConfig> {
     let fleet = tempfile::tempdir().unwrap();
     let drive = fleet.path().join("drive");
@@ -85,14 +85,18 @@ fn the_file_above_completes_what_is_not_said() {
     let above = "for_folders = true\nfps = 20\nspeed_unit = 'km/h'\nstart_s = 5\nspeed = 'all.csv'\nhfov_deg = 69\n\
                  [mount]\nup_m = 1.2\n[vehicle]\nspeed_scale = 0.98\n";
     let config = read_below(above, "fps = 25\n").unwrap();
-    assert_eq!(config.fps, Some(25.0), "its own goes before it");
+    assert_eq!(config.fps, Some(25.0), "its own value takes precedence");
     assert_eq!(config.speed_unit.as_deref(), Some("km/h"));
     assert_eq!(config.mount.map(|mount| mount.up_m), Some(1.2));
     assert_eq!(config.speed_scale(), 0.98);
     let of_one = (config.start_s, config.speed, config.hfov_deg);
-    assert_eq!(of_one, (None, None, None), "a recording's own");
+    assert_eq!(
+        of_one,
+        (None, None, None),
+        "keys of a single recording are not inherited"
+    );
     assert_eq!(config.above.unwrap().hfov_deg, Some(69.0));
-    // A table counts as a whole.
+    // Tables are not merged.
     let config = read_below(above, "[mount]\nleft_m = 0.5\n").unwrap();
     assert_eq!(config.mount.map(|mount| mount.up_m), Some(0.0));
 }
@@ -112,12 +116,12 @@ fn a_file_above_that_is_a_recordings_says_nothing() {
             "{above}"
         );
     }
-    // A key that was to be this one does not pass silently.
+    // A misspelled key is an error.
     for above in ["for_folder = true\n", "fps = 20\nFor-Folders = true\n"] {
         let error = read_below(above, "").unwrap_err().to_string();
         assert!(error.contains("unknown field"), "{error}");
     }
-    // One that is for the folders is named where it is wrong.
+    // An error names the file for subfolders if it is there.
     let error = read_below("for_folders = true\nfps = 0\n", "").unwrap_err();
     let error = error.to_string();
     assert!(!error.contains("drive/dataset.toml"), "{error}");

@@ -50,155 +50,155 @@ pub enum Error {
     /// A file or folder could not be opened, read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The path holds something, but nothing that is known.
+    /// The path exists, but is not a recording of a known layout.
     #[error(
-        "{}: no recording of a known layout: {found}\nlooked for, and not there:\n{LOOKED_FOR}",
+        "{}: not a recording of a known layout: {found}\nknown layouts:\n{LOOKED_FOR}",
         path.display()
     )]
     UnknownLayout {
         /// The path given.
         path: PathBuf,
-        /// What is there instead.
+        /// What was found there.
         found: FoundInstead,
     },
-    /// The folder is no recording, but holds some.
-    #[error("{}: no recording by itself: it holds {} (such as {})", path.display(), count_of(*count, "recording"), such_as.display())]
+    /// The folder is not a recording, but contains recordings.
+    #[error("{}: not a recording, but a folder with {} (such as {})", path.display(), count_of(*count, "recording"), such_as.display())]
     FolderOfRecordings {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
         /// How many recordings lie directly in it.
         count: usize,
         /// The first of them.
         such_as: PathBuf,
     },
-    /// A part of the recording that is needed is not there.
-    #[error("{}: missing, it holds {part}", path.display())]
+    /// A required part of the recording is missing.
+    #[error("{}: not found; it should contain {part}", path.display())]
     Missing {
-        /// Where it should be.
+        /// Path at which the file or folder was expected.
         path: PathBuf,
-        /// What it would hold.
+        /// What it should contain.
         part: MissingPart,
     },
     /// No drive has an image of the camera.
     #[error("{}: no image of camera {camera} (<number>.png or .jpg)", path.display())]
     NoImages {
-        /// Where they should be.
+        /// Folder in which they were expected.
         path: PathBuf,
         /// The camera's number.
         camera: u8,
     },
-    /// What else can go wrong with an image's file.
+    /// Any other error of an image file.
     #[error(transparent)]
     ImageFile(deepfusion_images::Error),
     /// An image cannot be read.
     #[error("{}: {problem}", path.display())]
     Image {
-        /// The image.
+        /// Path of the image.
         path: PathBuf,
-        /// Why not.
+        /// Why it cannot be read.
         #[source]
         problem: ImageProblem,
     },
-    /// An image has another size than its camera's calibration.
+    /// An image's size differs from that of its camera's calibration.
     #[error(
-        "{image}: frame {frame} of {drive} is {}x{}, its calibration says {}x{} ({field} in {})",
+        "{image}: frame {frame} of {drive} is {}x{}, but its calibration is for {}x{} ({field} in {})",
         found.0, found.1, expected.0, expected.1, calibration
     )]
     FrameSize {
-        /// The image.
+        /// Name of the image.
         image: String,
-        /// Its drive.
+        /// Name of its drive.
         drive: String,
         /// Its frame number.
         frame: u64,
-        /// Its width and height.
+        /// Its width and height, in pixels.
         found: (u32, u32),
-        /// The calibration's.
+        /// Width and height of the calibration, in pixels.
         expected: (u32, u32),
-        /// The field that says so.
+        /// The calibration's field with that size.
         field: &'static str,
-        /// What said it.
+        /// Where the calibration comes from.
         calibration: CalibrationSource,
     },
-    /// Another camera is asked for than the only one there is.
-    #[error("{}: there is one camera, which counts as camera 2", path.display())]
+    /// A camera other than the only one was requested.
+    #[error("{}: its only camera is camera 2", path.display())]
     OneCamera {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
     },
-    /// A camera's calibration file cannot be used.
+    /// A camera's calibration cannot be used.
     #[error("{by}: {problem}")]
     CameraFile {
-        /// The file, or who else says the camera.
+        /// Where the calibration comes from.
         by: CalibrationSource,
-        /// Why not.
+        /// Why it cannot be used.
         #[source]
         problem: CameraProblem,
     },
-    /// Nothing says what the camera of images in files is.
-    #[error("{}: nothing says what its camera is", path.display())]
+    /// No calibration was found for the camera of images in files.
+    #[error("{}: no calibration of its camera", path.display())]
     NoCameraFile {
-        /// The folder in which a calibration is looked for first.
+        /// Folder in which a calibration is looked for first.
         path: PathBuf,
-        /// The layout.
+        /// Layout of the recording.
         layout: DatasetKind,
     },
     /// There is no folder into which a video's frames can be decoded.
     #[error(
-        "{}: its frames cannot be decoded: neither its folder nor the user's cache folder can be written",
+        "{}: no place for its decoded frames: neither its folder nor the user's cache folder is writable",
         video.display()
     )]
     NoPlaceForFrames {
-        /// The video.
+        /// Path of the video.
         video: PathBuf,
-        /// What the system said of its folder.
+        /// The system's error for the video's folder.
         source: std::io::Error,
     },
-    /// Neither a bag nor the file beside it says what the camera is.
-    #[error("{}: nothing says what the camera is: no CameraInfo with a K", path.display())]
+    /// Neither a bag nor the file beside it has the camera's calibration.
+    #[error("{}: no calibration of its camera: no CameraInfo with a K", path.display())]
     NoBagCamera {
-        /// The bag.
+        /// Path of the bag.
         path: PathBuf,
-        /// The file beside it, which may say it.
+        /// Path of the file beside it, in which the calibration can be given.
         config: PathBuf,
     },
-    /// Intrinsics given for a layout that has its own.
-    #[error("{}: {layout} brings its own calibration", path.display())]
+    /// Intrinsics were given for a layout that includes a calibration.
+    #[error("{}: {layout} includes its own calibration", path.display())]
     OwnCalibration {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
         /// Its layout.
         layout: &'static str,
     },
-    /// A table of JSON cannot be read, or names a row that another table has not.
+    /// A JSON table cannot be read, or refers to a missing row of another table.
     #[error("{}:{line}: {field}: {problem}", path.display())]
     Json {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The line, counted from 1.
         line: usize,
-        /// The field.
+        /// Name of the field.
         field: String,
         /// What is wrong with it.
         #[source]
         problem: JsonProblem,
     },
-    /// A root holds several sets of tables, of which some tell of the same drives.
-    #[error("{}: holds {}", path.display(), versions.join(", "))]
+    /// A root contains several sets of tables with some drives in common.
+    #[error("{}: contains several sets of tables: {}", path.display(), versions.join(", "))]
     SeveralVersions {
-        /// The root.
+        /// Path of the root.
         path: PathBuf,
-        /// The folders of tables.
+        /// Names of the folders of tables.
         versions: Vec<String>,
     },
-    /// A line of a file of poses cannot be read.
+    /// A line of a pose file cannot be read.
     #[error("{}:{line}: {field}: {problem}", path.display())]
     Pose {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The line, counted from 1.
         line: usize,
-        /// Which number of the line, or all of it.
+        /// Which number of the line, or the whole pose.
         field: PoseField,
         /// What is wrong with it.
         #[source]
@@ -207,7 +207,7 @@ pub enum Error {
     /// A `dataset.toml` cannot be used.
     #[error("{}: {problem}", path.display())]
     Config {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// What is wrong with it.
         #[source]
@@ -216,182 +216,182 @@ pub enum Error {
     /// A value of a table cannot be used.
     #[error("{}:{line}: column {column}: {problem}", path.display())]
     Table {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The line, counted from 1, the header's included.
+        /// The line, counted from 1, including the header.
         line: u64,
-        /// The column's name, or its number counted from 1.
+        /// The column's name, or its number, counted from 1.
         column: String,
         /// What is wrong with the value.
         #[source]
         problem: TableProblem,
     },
-    /// A log of a vehicle's, a receiver's or an app's cannot be used.
+    /// A log from a vehicle, a GPS receiver or an app cannot be used.
     #[error(transparent)]
     Log(#[from] deepfusion_logs::Error),
-    /// A table lacks a column, or nothing says its unit.
+    /// A table lacks a column, or the unit of a column is unknown.
     #[error("{}: {problem}", path.display())]
     Columns {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// What is wrong.
         #[source]
         problem: ColumnsProblem,
     },
-    /// Two clocks have no time in common.
+    /// The times of the speeds and those of the frames do not overlap.
     #[error(
-        "{}: its times ({} to {} s) have none in common with the frames' ({} to {} s)",
+        "{}: its times ({} to {} s) do not overlap with the frames' ({} to {} s)",
         path.display(), times_s.0, times_s.1, frames_s.0, frames_s.1
     )]
     Clocks {
-        /// The file of speeds.
+        /// Path of the file of speeds.
         path: PathBuf,
         /// Its first and last time, in seconds.
         times_s: (f64, f64),
         /// The frames' first and last time, in seconds.
         frames_s: (f64, f64),
     },
-    /// A layout without speeds cannot give ego-motion.
+    /// A drive has no ego-motion, for lack of speeds or times.
     #[error("{drive}: {reason}")]
     NoTrack {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
         /// What is missing.
         #[source]
         reason: NoTrackReason,
     },
-    /// Nobody measured where the camera went.
-    #[error("{drive}: a recording of this layout ({layout}) holds no path of the camera")]
+    /// The camera's path was not measured.
+    #[error("{drive}: recordings of this layout ({layout}) do not contain the camera's path")]
     NoPath {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
         /// The layout.
         layout: &'static str,
     },
-    /// Ground truth of a kind that the recording cannot have.
-    #[error("{drive}: it has no ground truth of the kind \"{}\"", kind.name())]
+    /// Ground truth of this kind is not available for the recording.
+    #[error("{drive}: no ground truth of the kind \"{}\"", kind.name())]
     DepthKind {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
-        /// What was asked for.
+        /// The kind requested.
         kind: GtKind,
     },
     /// A ROS bag cannot be read.
     #[error(transparent)]
     Bag(#[from] deepfusion_rosbag::Error),
-    /// A bag's topics are not what is needed.
+    /// A bag's topics are not those required.
     #[error("{}: {problem}", path.display())]
     Topic {
-        /// The bag.
+        /// Path of the bag.
         path: PathBuf,
-        /// Why not.
+        /// What is wrong with them.
         #[source]
         problem: Box<TopicProblem>,
-        /// A role and a topic that it could be named for, as a caller may too ([`crate::OpenOptions::topics`]).
+        /// A role and a possible topic for it, which a caller may select with [`crate::OpenOptions::topics`].
         choice: Option<NamedTopic>,
     },
-    /// A topic was named for a recording that has none.
+    /// A topic was named for a recording that has no topics.
     #[error("{}: {topic}: {layout} has no topics", path.display())]
     NoTopics {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
         /// Its layout.
         layout: &'static str,
-        /// The topic.
+        /// The topic named.
         topic: NamedTopic,
     },
-    /// A bag was needed.
-    #[error("{}: it is no ROS bag but of the layout {layout}", path.display())]
+    /// The recording is not a bag, but a bag is required.
+    #[error("{}: not a ROS bag, but of the layout {layout}", path.display())]
     NotABag {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
         /// Its layout.
         layout: &'static str,
     },
-    /// The transforms of a bag's frames do not say where a sensor is, and contradict each other.
+    /// The transforms between a bag's frames contradict each other.
     #[error("{}: {problem}", path.display())]
     Frames {
-        /// The bag.
+        /// Path of the bag.
         path: PathBuf,
-        /// What contradicts what.
+        /// The contradiction.
         #[source]
         problem: FramesProblem,
     },
-    /// A vehicle's sensors make no motion.
+    /// No motion can be computed from the vehicle's sensors.
     #[error("{}: {source}", path.display())]
     Motion {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
-        /// Why not.
+        /// Why it cannot be computed.
         source: deepfusion_motion::Error,
     },
-    /// A bag's inertial unit cannot be read as it is mounted, or not at all.
+    /// A bag's inertial unit cannot be used with its mounting, or not at all.
     #[error("{}: {source}", path.display())]
     InertialUnit {
-        /// The bag.
+        /// Path of the bag.
         path: PathBuf,
-        /// Why not.
+        /// Why it cannot be used.
         source: Box<deepfusion_motion::Error>,
-        /// The file beside the bag, which may leave the unit out.
+        /// Path of the file beside the bag, in which the unit can be left out.
         config: PathBuf,
     },
-    /// Something is there already where something is to be written.
+    /// The output path already exists.
     #[error("{}: already exists", path.display())]
     Exists {
-        /// The file, or the folder that is not empty.
+        /// Path of the file, or of the folder that is not empty.
         path: PathBuf,
     },
-    /// The folder for a converted recording looks empty, and another writer is at work there, or died and what it left cannot be removed.
+    /// The folder for a converted recording looks empty, but another writer is using it, or the remains of one that died cannot be removed.
     #[error(transparent)]
     Unfinished(#[from] deepfusion_fs::Unfinished),
-    /// A conversion ended before the last frame, as its caller wanted: nothing of it is left.
+    /// The caller stopped a conversion before the last frame; its partial output was removed.
     #[error("nothing is written: stopped after {done} of {}", count_of(*total, "frame"))]
     Stopped {
-        /// Frames done.
+        /// Number of frames done.
         done: usize,
-        /// Frames in all.
+        /// Number of frames in all.
         total: usize,
     },
-    /// Recordings of different cameras cannot be drives of one date.
+    /// Recordings with different cameras cannot be drives of one KITTI date.
     #[error("{first} and {other} have different cameras, and a KITTI date has one calibration")]
     Cameras {
-        /// A recording.
+        /// Name of a recording.
         first: String,
-        /// One with another camera, or another place of it.
+        /// Name of one with another camera, or with the camera in another place.
         other: String,
     },
-    /// A frame without a time.
-    #[error("{drive}: frame {frame} has no time, and a bag is ordered by time")]
+    /// A frame has no time.
+    #[error("{drive}: frame {frame} has no time, which a bag requires")]
     NoTimes {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
         /// The frame's number.
         frame: u64,
     },
-    /// A segment of comma2k19 that has streams, but no video.
-    #[error("{}: the segment's images are absent", path.display())]
+    /// A comma2k19 segment has other streams, but no video.
+    #[error("{}: not found; it should contain the segment's images", path.display())]
     NoSegmentVideo {
-        /// The video.
+        /// Path at which the video was expected.
         path: PathBuf,
     },
-    /// A recording that has streams, but no images.
+    /// A recording has other streams, but no images.
     #[error("{}: {reason}", path.display())]
     NoFrames {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
         /// Why it has none.
         #[source]
         reason: NoFramesReason,
     },
-    /// A video cannot be read, or ffmpeg is not there to read it.
+    /// A video cannot be read, or ffmpeg is not installed.
     #[error(transparent)]
     Video(deepfusion_video::Error),
-    /// A calibration file lacks a field or has a bad one.
+    /// A calibration file lacks a field, or one is invalid.
     #[error("{}: {field}: {problem}", path.display())]
     Calibration {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The field, such as `P_rect_02`.
+        /// Name of the field, such as `P_rect_02`.
         field: String,
         /// What is wrong with it.
         #[source]
@@ -400,7 +400,7 @@ pub enum Error {
     /// A line of a time stamp file cannot be read.
     #[error("{}:{line}: {problem}", path.display())]
     TimeStamp {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The line, counted from 1.
         line: usize,
@@ -410,21 +410,21 @@ pub enum Error {
     },
     /// A frame has no line in the time stamp file.
     #[error(
-        "{}: has {} (frames 0 to {}), but there is a frame {frame}",
+        "{}: {} (for frames 0 to {}), but there is a frame {frame}",
         path.display(), count_of(*lines, "time stamp"), lines.saturating_sub(1)
     )]
     NoTimeStamp {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// How many time stamps it has.
+        /// Number of time stamps in the file.
         lines: usize,
-        /// The frame without one.
+        /// Number of the frame without a time stamp.
         frame: u64,
     },
     /// An OXTS packet cannot be read.
     #[error("{}: {field}: {problem}", path.display())]
     Oxts {
-        /// The packet's file.
+        /// Path of the packet's file.
         path: PathBuf,
         /// The field.
         field: OxtsField,
@@ -432,21 +432,21 @@ pub enum Error {
         #[source]
         problem: OxtsProblem,
     },
-    /// A file of tracklets cannot be read.
+    /// A tracklet file cannot be read.
     #[error("{}: {place}: {problem}", path.display())]
     Tracklets {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Where in it.
+        /// Where in the file.
         place: TrackletPlace,
         /// What is wrong there.
         #[source]
         problem: TrackletsProblem,
     },
-    /// A split file's line cannot be read.
+    /// A line of a split file cannot be read.
     #[error("{}:{line}: {problem}", path.display())]
     Split {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The line, counted from 1.
         line: usize,
@@ -456,100 +456,101 @@ pub enum Error {
     },
     /// A split selects no frame of the recording.
     #[error(
-        "{}: {} in {} (it begins with {first})",
+        "{}: {} in {} (first entry: {first})",
         split.display(), none_is(*entries), path.display()
     )]
     SplitSelectsNothing {
-        /// The split file.
+        /// Path of the split file.
         split: PathBuf,
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
-        /// How many frames the split names.
+        /// Number of frames in the split.
         entries: usize,
-        /// The first of them.
+        /// The first of them, as written in the file.
         first: String,
     },
-    /// Frame offsets that make no pair.
-    #[error("frame offsets {offsets:?}: expected at least one, none of them 0, none twice")]
+    /// Frame offsets that form no valid pairs.
+    #[error(
+        "frame offsets {offsets:?}: expected at least one, each different from 0 and from the others"
+    )]
     Offsets {
         /// The offsets given.
         offsets: Vec<i32>,
     },
-    /// A drive of a single frame has no pairs.
-    #[error("{drive}: only frame {frame} is there, and a pair needs two consecutive frames")]
+    /// A drive with a single frame has no pairs.
+    #[error("{drive}: frame {frame} is its only frame, but a pair needs two consecutive frames")]
     OneFrame {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
         /// The number of its frame.
         frame: u64,
     },
-    /// The car never moves.
+    /// The vehicle never moves.
     #[error(
-        "{drive}: the car stands: {}, the fastest at {fastest_mps:.2} m/s, \
-         none reaches {min_speed_mps} m/s",
+        "{drive}: the vehicle stands still: the fastest of {} moves at {fastest_mps:.2} m/s, below the minimum of {min_speed_mps} m/s",
         count_of(*pairs, "pair")
     )]
     Standing {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
-        /// How many pairs were looked at.
+        /// Number of pairs considered.
         pairs: usize,
-        /// Mean speed of the fastest.
+        /// Mean speed of the fastest pair, in m/s.
         fastest_mps: f64,
-        /// The speed asked for.
+        /// Minimum speed requested, in m/s.
         min_speed_mps: f64,
     },
-    /// No pair is left, for the reasons counted.
+    /// No pair of frames can be used, for the reasons counted.
     #[error(
         "{drive}: no pair of frames can be used: of {}, {no_neighbour} without a neighbour \
-         at offsets {offsets:?}{}, {bad_time} with time stamps that do not increase, {no_motion} not covered by the speeds (oxts, speed.csv)",
+         at offsets {offsets:?}{}, {bad_time} with time stamps that do not increase, {no_motion} without speeds at their time (oxts, speed.csv)",
         count_of(*targets, "frame"),
         a_step(*frame_distance_m)
     )]
     NoPairs {
-        /// The drive.
+        /// Name of the drive.
         drive: String,
-        /// How many frames were looked at.
+        /// Number of frames considered.
         targets: usize,
-        /// The offsets of the neighbours asked for.
+        /// Requested offsets of the neighbours, in frames.
         offsets: Vec<i32>,
-        /// Metres that each step of an offset was asked to have moved; 0: none.
+        /// Requested movement per step of an offset, in metres; 0 for none.
         frame_distance_m: f64,
-        /// How many have no such neighbour.
+        /// Number of frames without such a neighbour.
         no_neighbour: usize,
-        /// How many have time stamps out of order.
+        /// Number of frames with time stamps out of order.
         bad_time: usize,
-        /// How many have no speed measured about their time.
+        /// Number of frames without a speed measured around their time.
         no_motion: usize,
     },
-    /// A velodyne scan cannot be read.
+    /// A LiDAR scan cannot be read.
     #[error(transparent)]
     Cloud(#[from] deepfusion_geometry::cloud::Error),
     /// An array file cannot be written.
     #[error("{}: {problem}", path.display())]
     Array {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// What went wrong.
         #[source]
         problem: ArrayProblem,
     },
-    /// A recording has no scan to make ground truth from.
-    #[error("{}: no velodyne scan belongs to any of its frames ({frames})", path.display())]
+    /// A recording has no scan to compute ground truth from.
+    #[error("{}: {}, but no velodyne scan for any", path.display(), count_of(*frames, "frame"))]
     NoScans {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
-        /// How many frames were looked at.
+        /// Number of frames considered.
         frames: usize,
     },
-    /// Two things that must have one size differ.
-    #[error("{what} is {}x{}, the image {}x{}", found.0, found.1, image.0, image.1)]
+    /// Something that must have the image's size has another.
+    #[error("{what} is {}x{}, but the image is {}x{}", found.0, found.1, image.0, image.1)]
     Size {
         /// What differs from the image.
         what: &'static str,
-        /// Its width and height.
+        /// Its width and height, in pixels.
         found: (u32, u32),
-        /// The image's.
+        /// Width and height of the image, in pixels.
         image: (u32, u32),
     },
 }
@@ -557,7 +558,7 @@ pub enum Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// The layouts that are told apart, in the order in which they are looked for.
+/// The known layouts, in the order in which they are looked for.
 const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/0000000000.png, here or up to two folders below
   KITTI odometry     sequences/00/ with image_2/000000.png, calib.txt and times.txt, or such a sequence
   KITTI-360          data_2d_raw/<drive>/image_00/data_rect/0000000000.png, or such a drive
@@ -593,13 +594,13 @@ impl From<deepfusion_video::Error> for Error {
 }
 
 impl Error {
-    /// An error of the system's at `path`.
+    /// An error of the operating system at `path`.
     #[must_use]
     pub fn file(path: &Path, source: std::io::Error) -> Self {
         FileError::new(path, source).into()
     }
 
-    /// The same error with `to` in place of `from` in the path that it names: what was written aside is gone when it is read.
+    /// The same error with `to` in place of `from` in its path: the temporary file no longer exists when the message is read.
     pub(crate) fn moved(self, from: &Path, to: &Path) -> Self {
         match self {
             Self::File(error) => Self::File(error.moved(from, to)),
@@ -607,7 +608,7 @@ impl Error {
         }
     }
 
-    /// Whether a bag of ROS 2 was given, and this program was built without its reader (the feature `ros2`).
+    /// Whether a ROS 2 bag was given to a program built without its reader (the feature `ros2`).
     #[must_use]
     pub fn needs_ros2(&self) -> bool {
         let unread = |found: &FoundInstead| cfg!(not(feature = "ros2")) && found.has_ros2_bags();
@@ -615,7 +616,7 @@ impl Error {
     }
 }
 
-/// That none of a split's frames is there.
+/// Says that none of a split's frames exists.
 fn none_is(entries: usize) -> String {
     match entries {
         1 => "its only frame is not".to_owned(),
@@ -623,7 +624,7 @@ fn none_is(entries: usize) -> String {
     }
 }
 
-/// How far apart the frames of a step were to be, if they were.
+/// The requested distance between the frames of a step, if any.
 fn a_step(frame_distance_m: f64) -> String {
     if frame_distance_m > 0.0 {
         format!(", {frame_distance_m} m a step")
@@ -642,7 +643,7 @@ mod tests {
     fn a_full_disk_is_an_error_with_a_hint() {
         use std::fs::File;
         use std::io::{BufWriter, Write};
-        // /dev/full takes no byte.
+        // Every write to /dev/full fails.
         let mut out = BufWriter::new(File::options().write(true).open("/dev/full").unwrap());
         out.write_all(b"x").unwrap();
         let error = Error::file(Path::new("depth.npz"), out.flush().unwrap_err());
@@ -669,11 +670,11 @@ mod tests {
         };
         assert_eq!(
             of(1).to_string(),
-            "split.txt: its only frame is not in drive (it begins with a 1 l)"
+            "split.txt: its only frame is not in drive (first entry: a 1 l)"
         );
         assert_eq!(
             of(2).to_string(),
-            "split.txt: none of its 2 frames is in drive (it begins with a 1 l)"
+            "split.txt: none of its 2 frames is in drive (first entry: a 1 l)"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! Which of a bag's sources drives, and the files beside a bag.
+//! Which of a bag's sources is used for speed and steering, and the files beside a bag.
 
 use crate::common::bag::{CAMERA, TinyBag};
 use crate::common::text_of;
@@ -15,13 +15,13 @@ const DBC: &str = "VERSION \"\"\n\nBU_: ECU\n\n\
     BO_ 344 WHEELS: 8 ECU\n SG_ SPEED : 7|16@0+ (0.01,0) [0|250] \"km/h\" ECU\n\n\
     BO_ 37 STEERING: 8 ECU\n SG_ ANGLE : 7|16@0- (0.1,0) [-500|500] \"deg\" ECU\n";
 const BY_DBC: &str = "[can]\ndbc = \"vehicle.dbc\"\nspeed = \"WHEELS.SPEED\"\n";
-/// The same signal without the file.
+/// The same signal without a DBC file.
 const INLINE: &str = "[can]\nspeed_unit = \"km/h\"\n\
     speed = { id = 0x158, layout = { start_bit = 7, length = 16, byte_order = \"motorola\", scale = 0.01 } }\n";
 const INLINE_STEERING: &str = "[vehicle]\nwheelbase_m = 2.5\n[can]\nsteering_rad = 0.0174533\n\
     steering = { id = 0x25, layout = { start_bit = 7, length = 16, byte_order = \"motorola\", number = \"signed\", scale = 0.1 } }\n";
 
-/// A frame of a number in its first two bytes, high byte first.
+/// A CAN frame with a number in its first two bytes, high byte first.
 fn frame(id: u32, raw: i16) -> Frame {
     let [high, low] = raw.to_be_bytes();
     Frame {
@@ -32,12 +32,12 @@ fn frame(id: u32, raw: i16) -> Frame {
     }
 }
 
-/// 10 m/s on the bus, of 3600 steps of 0.01 km/h.
+/// 10 m/s on the bus: 3600 steps of 0.01 km/h.
 fn ten_mps() -> Frame {
     frame(0x158, 3600)
 }
 
-/// A bag `drive.bag` in a folder of its own, and its file.
+/// A bag `drive.bag` in a folder of its own, with its configuration file.
 struct Drive {
     folder: TempDir,
     bag: PathBuf,
@@ -63,7 +63,7 @@ impl Drive {
         open(&self.bag).unwrap().frames()[12].speed_mps.unwrap()
     }
 
-    /// Over half a second.
+    /// Mean speed over half a second.
     fn turn_rad(&self) -> f64 {
         let dataset = open(&self.bag).unwrap();
         let track = dataset.track().unwrap();
@@ -101,7 +101,8 @@ fn a_speed_on_the_bus_is_not_mixed_with_a_topics() {
     }
 }
 
-/// A bag with a speed's topic that is not to be read, and the speed on the bus: the file says so, also once it is written anew.
+/// A bag with a topic of speeds that is not to be read, according to its file, and the speed on the CAN bus. The setting is kept if the
+/// file is written again.
 #[test]
 fn no_topic_and_a_signal_do_not_contradict_each_other() {
     let drive = Drive::new(&format!("{INLINE}[topics]\nspeed = \"none\"\n"), |bag| {
@@ -112,7 +113,7 @@ fn no_topic_and_a_signal_do_not_contradict_each_other() {
     let written = fs::read_to_string(drive.bag.with_extension("toml")).unwrap();
     says(&written, &["speed = \"none\"", "[can]"]);
     near(drive.speed(), 10.0);
-    // A caller's word leaves the signal out, too.
+    // The caller can leave out the signal too.
     let options = OpenOptions {
         topics: vec!["speed=none".parse().unwrap()],
         ..OpenOptions::default()
@@ -121,7 +122,7 @@ fn no_topic_and_a_signal_do_not_contradict_each_other() {
     assert_eq!(without.frames()[12].speed_mps, None);
 }
 
-/// All bits set is J1939's way to say that there is no value: here 655.35 km/h.
+/// All bits set means a missing value in J1939: here 655.35 km/h.
 #[test]
 fn a_value_that_a_bus_has_not_is_no_speed() {
     let drive = Drive::new(BY_DBC, |bag| {
@@ -132,7 +133,7 @@ fn a_value_that_a_bus_has_not_is_no_speed() {
     let said = text_of(open(&drive.bag).unwrap().warnings());
     says(
         &said,
-        &["can.speed: 25 values beyond the signal's range left out"],
+        &["can.speed: 25 values outside the signal's range left out"],
     );
 }
 
@@ -148,7 +149,7 @@ fn requests_and_error_frames_carry_no_speed() {
             is_error: true,
             ..zero.clone()
         };
-        // Of 29 bits, another frame with the same number.
+        // With 29 bits, it is another frame with the same number.
         let extended = Frame {
             is_extended: true,
             ..zero
@@ -191,14 +192,14 @@ fn a_topic_and_a_signal_of_one_quantity_are_refused() {
 
 #[test]
 fn steering_on_the_bus_is_not_mixed_with_a_topics() {
-    // 5.73° on the bus to the left, the topic's wheels to the right.
+    // 5.73° to the left on the bus, to the right in the topic.
     let drive = Drive::new(INLINE_STEERING, |bag| {
         bag.can("/can", &frame(0x25, 57)).twist("/twist", 10.0);
         bag.ackermann("/drive", 5.0, -0.2);
     });
     let yaw_rate = 10.0 * (57.0 * 0.1 * 0.0174533_f64).tan() / 2.5;
     near(drive.turn_rad(), 0.5 * yaw_rate);
-    // The other quantity of the same message stays its own.
+    // The other quantity of the same message is still read from it.
     near(drive.speed(), 10.0);
 }
 
@@ -242,7 +243,7 @@ fn the_documented_signals_are_read() {
     let drive = Drive::new(
         &format!("{example}\n[vehicle]\nwheelbase_m = 2.5\n"),
         |bag| {
-            // 4 steps of 1.5°, of 12 bits from the lowest on.
+            // 4 steps of 1.5°, in 12 bits starting with the lowest.
             bag.can("/can", &ten_mps())
                 .can("/can", &frame(0x25, 0x0400));
         },
@@ -259,7 +260,7 @@ fn a_signal_that_cannot_be_is_refused_by_its_field() {
     let by_name = BY_DBC.replace("dbc = \"vehicle.dbc\"\n", "");
     let steering = INLINE_STEERING.replace("steering_rad = 0.0174533\n", "");
     for (sidecar, parts) in [
-        (by_name, ["can.speed names WHEELS.SPEED", "can.dbc"]),
+        (by_name, ["can.speed is the name WHEELS.SPEED", "can.dbc"]),
         (
             BY_DBC.replace("WHEELS.SPEED", "WHEELS.SPED"),
             ["SPED", "`WHEELS`, which has SPEED"],
@@ -338,7 +339,7 @@ fn a_calibration_file_is_the_camera() {
     let dataset = open(&drive("/camera/image", file).bag).unwrap();
     let k = dataset.intrinsics(0);
     assert_eq!((k.width, k.height), (64, 48));
-    // The lens' correction keeps the matrix, or all but.
+    // The lens correction keeps the matrix, or nearly so.
     let plain = CALIBRATION.replace("-0.1", "0.");
     let straight = drive("/camera/image", file);
     fs::write(straight.folder.path().join("sensors/camera.yaml"), plain).unwrap();
@@ -348,7 +349,7 @@ fn a_calibration_file_is_the_camera() {
         (found.fx, found.fy, found.cx, found.cy),
         (70.0, 71.0, 31.0, 23.0)
     );
-    // The distortion is taken out of the pictures, not only read.
+    // The distortion is corrected in the images, not only read.
     let [bent, flat] = [&dataset, &straight].map(|d| d.load_image(0).unwrap());
     assert_ne!(bent, flat);
 
@@ -360,7 +361,7 @@ fn a_calibration_file_is_the_camera() {
     says(&gone, &["drive.toml", "calibration", "gone.yaml"]);
 }
 
-/// The file beside a link is the link's; where there is none, what it leads to has one.
+/// The file beside a link takes precedence; otherwise the one beside its target is read.
 #[cfg(unix)]
 #[test]
 fn the_file_beside_a_link_counts() {
@@ -379,14 +380,14 @@ fn the_file_beside_a_link_counts() {
         format!("{CAMERA}scenario = \"link\"\n"),
     )
     .unwrap();
-    // Given itself, or found in its folder.
+    // Given directly, or found in its folder.
     for path in [link.as_path(), links.path()] {
         let dataset = open(path).unwrap();
         assert_eq!(scenario(&dataset).as_deref(), Some("link"));
         assert_eq!(dataset.name(), "monday");
     }
     assert_eq!(inspect(&link).unwrap().drives[0].name, "monday");
-    // A store whose files have no ending.
+    // The target's name has no extension.
     let stored = links.path().join("9f86d081");
     fs::rename(&drive.bag, &stored).unwrap();
     fs::remove_file(&link).unwrap();
@@ -423,13 +424,13 @@ fn a_bag_without_a_camera_is_left_out_of_a_folder_and_named() {
     assert_eq!((seen.frames, seen.drives.len()), (all[0].frames().len(), 1));
     assert!(seen.unreadable.is_empty(), "{:?}", seen.unreadable);
     let noted = text_of(&seen.drives[0].warnings);
-    assert!(noted.contains("no images: lidar.bag"), "{noted}");
-    // Alone it is what it is.
+    assert!(noted.contains("lack of images: lidar.bag"), "{noted}");
+    // Given alone, it is an error.
     let error = open(&other).unwrap_err().to_string();
-    assert!(error.contains("holds images"), "{error}");
+    assert!(error.contains("has images"), "{error}");
 }
 
-/// Files that are no bags but by their names, before and behind a good one, and what is left of another, which has no images.
+/// Files with a bag's name that are not bags, before and after a good one, and the remains of another bag, without images.
 #[test]
 fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
     let drive = Drive::new("", |bag| {
@@ -450,7 +451,7 @@ fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
     let files: Vec<_> = files.flatten().collect();
     assert_eq!(files, ["a.bag", "z.bag"]);
     let noted = text_of(&seen.drives[0].warnings);
-    assert!(noted.contains("no images: m.bag"), "{noted}");
+    assert!(noted.contains("lack of images: m.bag"), "{noted}");
     let error = &seen.unreadable[0].error;
     assert!(matches!(**error, Error::Bag(_)), "{error}");
     let text = seen.to_string();
@@ -464,14 +465,14 @@ fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
     fs::remove_file(&drive.bag).unwrap();
     let none = inspect(at).unwrap();
     assert_eq!((none.drives.len(), none.unreadable.len()), (0, 3));
-    assert!(none.to_string().contains("nothing can be read"), "{none}");
-    // One reason for all is an error, and so is a bag alone.
+    assert!(none.to_string().contains("unreadable"), "{none}");
+    // The same reason for all is an error, as is a single bag.
     for name in ["m.bag", "a.bag"] {
         fs::remove_file(at.join(name)).unwrap();
         let error = inspect(at).unwrap_err();
         assert!(matches!(error, Error::Bag(_)), "{error}");
     }
-    // Of several without images, too.
+    // Also for several bags without images.
     fs::remove_file(at.join("z.bag")).unwrap();
     for name in ["m.bag", "n.bag"] {
         fs::write(at.join(name), "#ROSBAG V2.0\n").unwrap();
@@ -483,7 +484,7 @@ fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
 #[test]
 fn a_twist_s_speed_is_scaled_like_any_other() {
     let sidecar = "[vehicle]\nspeed_scale = 0.9\n";
-    // By a twist that turns, which is taken as it is, and by one whose motion is fused.
+    // From a twist with a yaw rate, which is used as it is, and from one whose motion is fused.
     for yaw_rate in [0.2, 0.0] {
         let drive = Drive::new(sidecar, |bag| {
             bag.turning_twist("/twist", |_| (10.0, yaw_rate));
@@ -500,7 +501,7 @@ fn a_twist_s_speed_is_scaled_like_any_other() {
     );
 }
 
-/// Publishers write NaN where they know no turn: always, or now and then.
+/// Publishers without a yaw rate write NaN: always, or sometimes.
 #[test]
 fn a_twist_without_a_yaw_rate_has_a_speed() {
     let never = Drive::new("", |bag| {
@@ -519,8 +520,8 @@ fn a_twist_without_a_yaw_rate_has_a_speed() {
     assert!(open(&now_and_then.bag).unwrap().yaw_known());
 }
 
-/// Rates say how the vehicle turned between two images, and not how it stands: their sum since the bag's begin, which a bias or a ramp makes ever
-/// greater, rolls no bend.
+/// Rates give the rotation between two images, not the attitude: the integral since the bag's beginning, which grows with a bias or on a
+/// ramp, must not add roll in bends.
 #[test]
 fn rates_of_roll_and_pitch_tilt_a_pair_alone() {
     let drive = Drive::new("", |bag| {
@@ -534,7 +535,7 @@ fn rates_of_roll_and_pitch_tilt_a_pair_alone() {
         near(moved.tilt_rad[0], 0.0);
         near(moved.tilt_rad[1], 0.15);
     }
-    // And so in a copy in KITTI's layout.
+    // The same in a copy in KITTI's layout.
     let out = drive.folder.path().join("copy");
     let whole = std::slice::from_ref(&dataset);
     convert_to_kitti(whole, &out, &mut |_, _| ControlFlow::Continue(())).unwrap();
@@ -555,12 +556,12 @@ fn a_steering_angle_without_a_wheelbase_does_not_replace_a_yaw_rate() {
     let drive = Drive::new("", fill);
     assert!(open(&drive.bag).unwrap().yaw_known());
     near(drive.turn_rad(), 0.5 * 0.2);
-    // With one it tells turns, as it always did.
+    // With a wheelbase it gives turns.
     let steered = Drive::new("[vehicle]\nwheelbase_m = 2.5\n", fill);
     near(steered.turn_rad(), 0.5 * 10.0 * 0.1_f64.tan() / 2.5);
 }
 
-/// Drivers that leave the header's time at 0 put all their messages at one instant, decades before the pictures.
+/// If drivers leave the header's time at 0, all their messages would be at the same time, decades before the images.
 #[test]
 fn messages_without_a_time_have_that_of_their_recording() {
     let sidecar = "[vehicle]\nwheelbase_m = 2.5\n";
@@ -570,7 +571,7 @@ fn messages_without_a_time_have_that_of_their_recording() {
         bag.imu("/imu", 0.4).ackermann("/drive", 0.0, 0.1);
     });
     let dataset = open(&drive.bag).unwrap();
-    // The twelfth picture's, 0.48 s on.
+    // The twelfth image is at 0.48 s.
     near(dataset.frames()[12].speed_mps.unwrap(), 10.48);
     // Gyro and steering agree.
     assert!(
@@ -595,7 +596,7 @@ fn messages_without_a_time_have_that_of_their_recording() {
     assert!(!warnings.contains("no time"), "{warnings}");
 }
 
-/// Of CAN frames, too.
+/// The same for CAN frames.
 #[test]
 fn frames_of_the_bus_without_a_time_have_that_of_their_recording() {
     let drive = Drive::new(INLINE, |bag| {
@@ -608,7 +609,7 @@ fn frames_of_the_bus_without_a_time_have_that_of_their_recording() {
     );
 }
 
-/// What cannot be read is told apart from what is merely odd.
+/// Unreadable parts are distinguished from oddities.
 #[test]
 fn damage_is_a_list_of_its_own_among_the_warnings() {
     let drive = Drive::new("", |bag| {

@@ -1,4 +1,4 @@
-//! Where a recording's camera comes from when nobody calibrated it: a field of view, or what the photographs say.
+//! The camera of a recording without a calibration: from a field of view, or from the photographs' EXIF.
 
 use crate::common::{TinyDrive, folder, text_of};
 use deepfusion_data::{Dataset, Error, OpenOptions, load_photo};
@@ -10,7 +10,7 @@ use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
-/// The photographs' size: 4:3, with a diagonal of 80 pixels.
+/// Size of the photographs: 4:3, with a diagonal of 80 pixels.
 const SIZE: (u32, u32) = (64, 48);
 /// Diagonal of 36 mm by 24 mm film.
 const FILM_MM: f64 = 43.266_615_305_567_87;
@@ -27,7 +27,7 @@ fn field(tag: Tag, value: Value) -> Field {
     }
 }
 
-/// What a phone says of its lens, but for the focal length in 35 mm film.
+/// A phone's EXIF fields about its lens, without the 35 mm equivalent focal length.
 fn phone(make: &str, model: &str, lens_um: u32) -> Vec<Field> {
     let text = |text: &str| Value::Ascii(vec![text.as_bytes().to_vec()]);
     let lens = Rational {
@@ -61,7 +61,7 @@ fn write_photo_with(path: &Path, block: &[u8]) {
         .unwrap();
     let mut bytes = plain[..2].to_vec();
     if !block.is_empty() {
-        // APP1, its length with these two bytes, its name, the block.
+        // APP1, its length including these two bytes, its name, the block.
         let length = u16::try_from(block.len() + 8).unwrap().to_be_bytes();
         bytes.extend([&[0xFF, 0xE1], &length[..], b"Exif\0\0", block].concat());
     }
@@ -69,7 +69,7 @@ fn write_photo_with(path: &Path, block: &[u8]) {
     fs::write(path, bytes).unwrap();
 }
 
-/// A folder of photographs with these blocks, ten in a second; without any calibration.
+/// A folder of photographs with these EXIF blocks, ten per second, without a calibration.
 fn photographs(folder: &Path, blocks: &[Vec<Field>]) {
     fs::create_dir_all(folder.join("images")).unwrap();
     for (n, fields) in blocks.iter().enumerate() {
@@ -99,7 +99,7 @@ fn a_field_of_view_is_a_camera() {
     fs::write(folder.join("dataset.toml"), "fps = 10\nhfov_deg = 60\n").unwrap();
     let by_file = open(folder, &OpenOptions::default()).unwrap();
     assert_eq!(by_file.intrinsics(0), by_caller);
-    // What the caller says comes first, and four numbers before an angle.
+    // The caller's options take precedence, and four numbers over an angle.
     let both = OpenOptions {
         intrinsics: Some([70.0, 70.0, 30.0, 20.0]),
         ..given
@@ -107,7 +107,7 @@ fn a_field_of_view_is_a_camera() {
     assert_eq!(open(folder, &both).unwrap().intrinsics(0).fx, 70.0);
 }
 
-/// A folder with settings for the recordings in it is all of them, each with its own settings.
+/// A folder whose settings apply to its subfolders gives all their recordings, each with its own settings.
 #[test]
 fn a_fleet_is_opened_as_a_whole() {
     let fleet = tempfile::tempdir().unwrap();
@@ -136,12 +136,12 @@ fn a_fleet_is_opened_as_a_whole() {
     let seen = deepfusion_data::inspect(fleet.path()).unwrap();
     assert_eq!((seen.drives.len(), seen.frames), (2, 5));
     assert!(!Dataset::all_simulated_at(fleet.path()));
-    // None is left out because it is broken.
+    // An invalid recording is not left out.
     fs::write(&own, "no TOML").unwrap();
     assert!(matches!(opened().unwrap_err(), Error::Config { .. }));
 }
 
-/// Settings for all folders of a fleet; a calibration of the drive's own goes before them.
+/// Settings for all folders of a fleet; a drive's own calibration takes precedence.
 #[test]
 fn the_camera_may_stand_once_for_many_recordings() {
     let fleet = tempfile::tempdir().unwrap();
@@ -165,7 +165,7 @@ fn angles_that_are_none_are_refused() {
     for (toml, why) in [
         (
             "hfov_deg = 170",
-            "hfov_deg is 170, it must be above 1 and below 170 degrees",
+            "hfov_deg is 170, expected more than 1 and less than 170 degrees",
         ),
         ("hfov_deg = 0", "hfov_deg is 0"),
         ("hfov_deg = nan", "hfov_deg is NaN"),
@@ -185,7 +185,7 @@ fn angles_that_are_none_are_refused() {
     assert!(matches!(error, Error::CameraFile { .. }), "{error}");
 }
 
-/// As piexif 1.1.3 writes {FocalLengthIn35mmFilm: 21}: its last directory has no end.
+/// As written by piexif 1.1.3 for {FocalLengthIn35mmFilm: 21}: its last directory has no end.
 #[test]
 fn a_block_without_its_end_says_what_it_holds() {
     let block = b"MM\0*\0\0\0\x08\0\x01\x87\x69\0\x04\0\0\0\x01\0\0\0\x1a\0\0\0\0\0\x01\xa4\x05\0\x03\0\0\0\x01\0\x15\0\0";
@@ -194,7 +194,7 @@ fn a_block_without_its_end_says_what_it_holds() {
     write_photo_with(&path, block);
     let focal = load_photo(&path).unwrap().intrinsics.unwrap().fx;
     assert!((focal - 21.0 / FILM_MM * 80.0).abs() < 1e-6, "{focal}");
-    // Of one that is cut within a field nothing is left.
+    // A block that is cut within a field is ignored.
     write_photo_with(&path, &block[..30]);
     assert_eq!(load_photo(&path).unwrap().intrinsics, None);
 }
@@ -209,12 +209,7 @@ fn photographs_say_what_their_camera_is() {
     ];
     for (name, block, film_mm, part) in [
         ("film", film, 26.0, "000.jpg: 26 mm in 35 mm film"),
-        (
-            "turned",
-            turned,
-            26.0,
-            "not turned as EXIF's orientation says",
-        ),
+        ("turned", turned, 26.0, "without the rotation in EXIF"),
         (
             "action camera",
             [
@@ -256,7 +251,7 @@ fn photographs_say_what_their_camera_is() {
             name == "action camera",
             "{warning}"
         );
-        // A single picture knows the same.
+        // A single image gives the same camera.
         let photo = load_photo(&folder.join("images/000.jpg")).unwrap();
         assert_eq!(photo.intrinsics.unwrap().fx, k.fx);
     }
@@ -276,7 +271,7 @@ fn photographs_that_say_nothing_or_too_much_are_no_camera() {
     let root = tempfile::tempdir().unwrap();
     for (name, block) in [
         ("nothing", vec![]),
-        // Its ultra-wide camera, whose view is not in the table.
+        // Its ultra-wide camera, whose field of view is not in the table.
         ("other-lens", phone("Apple", "iPhone 14 Pro", 2220)),
         ("unknown", phone("Nobody", "Telephone 1", 4200)),
         ("zoomed", {
@@ -295,10 +290,10 @@ fn photographs_that_say_nothing_or_too_much_are_no_camera() {
         );
         let hint = error.hint().unwrap();
         assert!(hint.contains("hfov_deg = ") && hint.len() < 250, "{hint}");
-        let said = format!("{name}: nothing says what its camera is");
+        let said = format!("{name}: no calibration of its camera");
         assert!(error.to_string().ends_with(&said), "{error}");
     }
-    // A zoom that moved, or a second phone, in one folder.
+    // Different zooms, or two phones, in one folder.
     let folder = root.path().join("mixed");
     let film = |mm| vec![short(Tag::FocalLengthIn35mmFilm, mm)];
     photographs(&folder, &[film(26), film(26), film(52)]);
@@ -341,7 +336,7 @@ fn a_calibration_that_is_given_goes_before_those_that_are_found() {
     };
     let k = Dataset::open(&folder, &options).unwrap()[0].intrinsics(0);
     assert_eq!([k.fx, k.fy, k.cx, k.cy], [40.0, 41.0, 30.0, 9.0]);
-    // KITTI raw has its own, and is not read by another.
+    // KITTI raw has its own calibration, and refuses another.
     let drive = TinyDrive::default().write(root.path());
     let refused = Dataset::open(&drive, &options).unwrap_err();
     assert!(matches!(refused, Error::OwnCalibration { .. }), "{refused}");

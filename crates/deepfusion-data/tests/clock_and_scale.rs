@@ -1,4 +1,4 @@
-//! A clock that is off and a speed that reads too fast, said once and taken out once, in every layout.
+//! A clock offset and a speed scale are corrected once, in every layout.
 
 use crate::common::bag::{CAMERA, TinyBag};
 use crate::common::folder;
@@ -11,27 +11,27 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// How far the camera's clock is ahead in the files written here, seconds.
+/// How far the camera's clock is ahead in the files written here, in seconds.
 const AHEAD_S: f64 = 0.2;
-/// And the speed's factor there.
+/// The speed scale in the files written here.
 const SCALE: f64 = 0.9;
 const BOTH: &str = "[clock]\ncamera_ahead_s = 0.2\n[vehicle]\nspeed_scale = 0.9\n";
 
-/// m/s by seconds on the vehicle's clock.
+/// Speed in m/s at a time in seconds on the vehicle's clock.
 fn speed_mps(t: f64) -> f64 {
     4.0 + 3.0 * t
 }
 
-/// A drive whose speed rises.
+/// A drive with increasing speed.
 struct Drive {
     layout: &'static str,
-    /// To be opened.
+    /// Path to open.
     path: PathBuf,
-    /// Beside it, where it says nothing yet.
+    /// Path of the configuration file, which does not exist yet.
     config: PathBuf,
-    /// A frame with speeds about it, whichever clock is ahead.
+    /// Index of a frame with speeds around it, with either clock ahead.
     frame: usize,
-    /// When that was, on the vehicle's clock if the two clocks are one, in seconds.
+    /// Time of that frame in seconds, on the vehicle's clock if the two clocks agree.
     at_s: f64,
     _folder: TempDir,
 }
@@ -121,17 +121,17 @@ fn clock_and_scale_are_taken_out_once_in_every_layout() {
         };
         write_config(&drive, "");
         near(drive.speed(&default), speed_mps(t), of);
-        // The option alone: what the camera calls t is 0.1 s earlier by the vehicle.
+        // Only the option: the camera's time t is 0.1 s earlier on the vehicle's clock.
         near(drive.speed(&ahead(0.1)), speed_mps(t - 0.1), of);
         near(drive.speed(&ahead(-0.05)), speed_mps(t + 0.05), of);
         write_config(&drive, BOTH);
         near(drive.speed(&default), SCALE * speed_mps(t - AHEAD_S), of);
-        // The option goes before the file, and is not added to it.
+        // The option replaces the file's value, and is not added to it.
         near(drive.speed(&ahead(0.1)), SCALE * speed_mps(t - 0.1), of);
         near(drive.speed(&ahead(0.0)), SCALE * speed_mps(t), of);
         let dataset = open(&drive.path, &default);
         near(dataset.camera_ahead_s(), AHEAD_S, of);
-        // Motion follows, and frames stay as far apart as they were.
+        // The motion changes accordingly, and the intervals between frames do not.
         let frames = dataset.frames();
         let [from, to] = [1, 0].map(|before| frames[drive.frame - before].time_s.unwrap());
         let motion = dataset.track().unwrap().motion(from, to).unwrap();
@@ -182,12 +182,12 @@ fn a_date_s_file_is_for_all_its_drives_and_a_drive_s_own_goes_before_it() {
     fs::write(&date, "vehicle.speed_scale = 0.5\n").unwrap();
     let speed = || open(&drive, &OpenOptions::default()).frames()[5].speed_mps;
     assert_eq!(speed(), Some(5.0));
-    // What its own does not say is the date's.
+    // Keys missing from the drive's own file come from the date's.
     fs::write(drive.join("dataset.toml"), "simulated = true\n").unwrap();
     assert_eq!(speed(), Some(5.0));
     fs::write(drive.join("dataset.toml"), "vehicle.speed_scale = 0.75\n").unwrap();
     assert_eq!(speed(), Some(7.5));
-    // The path that OXTS gives is as long as the speeds say.
+    // The length of the path from OXTS agrees with the speeds.
     let paths = open(&drive, &OpenOptions::default())
         .camera_paths()
         .unwrap();
@@ -221,7 +221,7 @@ fn what_cannot_be_a_clock_or_a_scale_is_refused_by_its_file() {
     }
 }
 
-/// A clock that counts from the video's start, and a speed signal that was there before it.
+/// A clock that counts from the video's start, with a speed signal that started before it.
 #[test]
 fn times_before_1970_are_moved_and_not_cut_off() {
     let root = tempfile::tempdir().unwrap();

@@ -48,7 +48,7 @@ fn without_its_video_a_segment_is_inspected_and_not_opened() {
     };
     assert!((stream("CAN/speed").rate_hz.unwrap() - 100.0).abs() < 1e-6);
     assert!((stream("frame_times").rate_hz.unwrap() - 20.0).abs() < 1e-6);
-    // Frames of a clock that is 0.1 s ahead are of 0.1 s earlier; a scale is one of the speed alone.
+    // With a clock that is 0.1 s ahead, frames are 0.1 s earlier. The scale only applies to the speed.
     let config = root.path().join("dataset.toml");
     fs::write(
         &config,
@@ -68,11 +68,7 @@ fn without_its_video_a_segment_is_inspected_and_not_opened() {
 
     let error = Dataset::open(root.path(), &OpenOptions::default()).unwrap_err();
     assert!(matches!(error, Error::NoSegmentVideo { .. }), "{error}");
-    assert!(
-        error
-            .to_string()
-            .contains("video.hevc: the segment's images are absent")
-    );
+    assert!(error.to_string().contains("video.hevc: not found"));
     assert!(error.hint().unwrap().contains("fetch video.hevc"));
 }
 
@@ -113,7 +109,7 @@ fn a_segment_s_gyroscope_and_steering_measure_its_turns() {
         "CAN/steering_angle",
         &[(0.2_f64 * 2.7 / 8.0).atan().to_degrees() * 15.0],
     );
-    assert_eq!(turned().0, None, "nothing says the wheelbase");
+    assert_eq!(turned().0, None, "the wheelbase is unknown");
     let vehicle = "[vehicle]\nwheelbase_m = 2.7\nsteering_ratio = 15.0\n";
     fs::write(root.path().join("dataset.toml"), vehicle).unwrap();
     let by_steering = turned().0;
@@ -126,7 +122,7 @@ fn broken_arrays_are_named() {
     write_segment(root.path());
     let value = root.path().join("processed_log/CAN/speed/value");
     let bytes = fs::read(&value).unwrap();
-    // A header that promises more than there is.
+    // The header announces more values than the file has.
     fs::write(&value, &bytes[..bytes.len() - 8]).unwrap();
     let error = inspect(root.path()).unwrap_err();
     assert!(error.to_string().contains("speed/value"), "{error}");
@@ -153,7 +149,7 @@ fn the_real_segment_is_inspected() {
         "{speed:?}"
     );
     assert!(
-        // The inertial unit's share over a minute is 0.1 / 60² of what it drifts.
+        // The inertial unit's drift over a minute contributes with a weight of 0.1 / 60².
         (seen.distance_m.unwrap() - 1003.2599).abs() < 5e-3,
         "{:?}",
         seen.distance_m

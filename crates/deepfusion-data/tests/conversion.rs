@@ -1,4 +1,4 @@
-//! A conversion that does not come to its end, and the one after it.
+//! Conversions that fail or are stopped, and the next attempt; and what conversions must preserve.
 
 use crate::common::{DRIVE, TinyDrive, folder};
 use deepfusion_data::{Dataset, Error, OpenOptions, convert_to_bag, convert_to_kitti};
@@ -9,7 +9,7 @@ use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// More frames than are read and written together.
+/// More frames than in one batch.
 fn drive(root: &Path) -> Dataset {
     let drive = TinyDrive {
         frames: (0..12).collect(),
@@ -70,7 +70,7 @@ fn what_a_killed_one_left_is_removed_and_what_another_writes_is_not() {
     let dataset = drive(&root.path().join("drive"));
     let out = root.path().join("kitti");
     let another = PartialFolder::beside(&out.join("2030_01_02")).unwrap();
-    // Of another date: whatever is half a folder goes.
+    // The remains of another date are removed too.
     let left = PartialFolder::beside(&out.join("2011_09_27")).unwrap();
     let folder = left.path().to_owned();
     fs::create_dir(folder.join("2011_09_27_drive_0001_sync")).unwrap();
@@ -92,7 +92,7 @@ fn one_that_is_stopped_leaves_nothing_unless_it_is_done() {
     let root = root.path();
     let dataset = drive(root);
     let (kitti, bag) = (root.join("new/kitti"), root.join("drive.bag"));
-    // Asked after the first frames, or after the last.
+    // Stopped after the first frames, or after the last.
     for (frames, is_done) in [(8, false), (12, true)] {
         let mut stop_at = |done: usize, total: usize| {
             assert_eq!(total, 12);
@@ -134,7 +134,7 @@ fn kitti_of(dataset: &Dataset, out: &Path) -> Dataset {
         .remove(0)
 }
 
-/// Packets hold zeros for what nobody measured: a copy of a drive without a yaw rate would go straight through every bend.
+/// Packets have zeros for unmeasured values: without a mark, a copy of a drive without a yaw rate would go straight through every bend.
 #[test]
 fn what_was_not_measured_is_not_measured_in_the_copy() {
     let root = tempfile::tempdir().unwrap();
@@ -162,12 +162,12 @@ fn what_was_not_measured_is_not_measured_in_the_copy() {
         warned.iter().any(|w| w.contains("yaw_known = false")),
         "{warned:?}"
     );
-    // KITTI's own drives measured all of it, and so did their copies.
+    // In KITTI's own drives all of it was measured, also in their copies.
     let own = kitti_of(&drive(&root.join("drive")), &root.join("own"));
     assert!(own.yaw_known() && !own.tilt_unknown());
 }
 
-/// An empty line is KITTI's way to say it.
+/// KITTI writes an empty line for a frame without a time.
 #[test]
 fn a_frame_without_a_time_has_none_in_the_copy() {
     let root = tempfile::tempdir().unwrap();
@@ -194,7 +194,7 @@ fn a_frame_without_a_time_has_none_in_the_copy() {
     assert_eq!(timed(&copy), timed(&dataset));
 }
 
-/// Names such as 20240101120000.png: a line for every number would be more than any disk holds.
+/// Names such as 20240101120000.png: a line for every number would not fit on any disk.
 #[test]
 fn numbers_that_are_dates_are_counted_anew() {
     let root = tempfile::tempdir().unwrap();
@@ -223,7 +223,7 @@ fn numbers_that_are_dates_are_counted_anew() {
     }
 }
 
-/// The folder that was written aside is gone when its error is read.
+/// An error must not name the temporary folder, which no longer exists.
 #[test]
 fn what_cannot_be_written_is_named_by_its_place() {
     let root = tempfile::tempdir().unwrap();
@@ -246,7 +246,7 @@ fn bag_of(dataset: &Dataset, out: &Path) -> Dataset {
     Dataset::open(out, &options).unwrap().remove(0)
 }
 
-/// What lies on either side of a pause are no neighbours, in a bag as little as in files with numbers.
+/// Frames on both sides of a pause are not neighbours, in a bag and in files with numbers.
 #[test]
 fn frames_that_a_bag_has_not_leave_out_their_numbers() {
     let root = tempfile::tempdir().unwrap();
@@ -268,7 +268,7 @@ fn frames_that_a_bag_has_not_leave_out_their_numbers() {
     }
 }
 
-/// A copy that gives a guess as known is never [aimed](Dataset::aim).
+/// An assumed mount must stay marked as assumed in a copy, or it would never be [aimed](Dataset::aim).
 #[test]
 fn a_place_of_the_camera_that_was_assumed_is_assumed_in_the_copy() {
     let root = tempfile::tempdir().unwrap();
@@ -291,7 +291,7 @@ fn a_place_of_the_camera_that_was_assumed_is_assumed_in_the_copy() {
             assert!(apart.translation().norm() < 1e-9 && apart.angle() < 1e-9);
             let said: Vec<String> = copy.warnings().iter().map(ToString::to_string).collect();
             assert_eq!(
-                said.iter().any(|w| w.contains("it is taken to look")),
+                said.iter().any(|w| w.contains("it looks straight ahead")),
                 assumed,
                 "{said:?}"
             );
@@ -299,7 +299,7 @@ fn a_place_of_the_camera_that_was_assumed_is_assumed_in_the_copy() {
     }
 }
 
-/// Packets at the frames of a camera that takes one a second would be too far apart to tell how the vehicle moved.
+/// Packets only at the frames of a camera with one image per second would be too far apart for the vehicle's motion.
 #[test]
 fn a_slow_camera_keeps_the_motion_between_its_frames() {
     let root = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Opening recordings: every layout, and every reason not to.
+//! Opening recordings, and every error of opening.
 
 use crate::common::{self, TinyDrive, text_of};
 use deepfusion_data::kitti::{Calibration, find_drives};
@@ -40,7 +40,7 @@ fn a_drive_a_date_and_a_root_open_the_same() {
     assert_eq!(all[0].load_image(3).unwrap().get_pixel(1, 1).0, [4, 13, 90]);
 }
 
-/// What a fleet's folders hold may be whole roots of drives, of the same names, and lack a camera.
+/// The folders of a fleet may be roots of several drives, have the same names, and lack a camera.
 #[test]
 fn of_a_fleet_those_without_images_of_the_camera_are_left_out() {
     let fleet = tempfile::tempdir().unwrap();
@@ -66,10 +66,7 @@ fn of_a_fleet_those_without_images_of_the_camera_are_left_out() {
     let found = right().unwrap();
     assert_eq!(found.len(), 1);
     let said = text_of(found[0].warnings());
-    assert!(
-        said.contains("left out, as they give no images: a"),
-        "{said}"
-    );
+    assert!(said.contains("left out for lack of images: a"), "{said}");
     fs::remove_dir_all(fleet.path().join("b")).unwrap();
     let error = right().unwrap_err();
     assert!(matches!(error, Error::NoImages { .. }), "{error}");
@@ -127,7 +124,7 @@ fn a_camera_lies_where_p_rect_says() {
     let (left, right) = (read(Camera::Left), read(Camera::Right));
     let k = left.intrinsics;
     assert_eq!((k.fx, k.cy, k.width, k.height), (36.0, 8.6, 62, 19));
-    // Camera 3 sits 0.06 + 0.47 m to the right of camera 2, looking the same way.
+    // Camera 3 is 0.06 + 0.47 m to the right of camera 2, with the same orientation.
     let right_from_left = right.cam_from_velo.unwrap() * left.cam_from_velo.unwrap().inverse();
     let t = right_from_left.translation();
     assert!(
@@ -135,14 +132,14 @@ fn a_camera_lies_where_p_rect_says() {
         "{t}"
     );
     assert!(right_from_left.angle() < 1e-9);
-    // The rigid way to a pixel and the printed matrices' agree but for their six decimals.
+    // The projection by rigid transforms agrees with that by the printed matrices, up to their six decimals.
     let point = nalgebra::Vector3::new(15.0, 2.0, -1.0);
     let rigid = k
         .project(&left.cam_from_velo.unwrap().transform(&point))
         .unwrap();
     let q = left.require_pixels_from_velo().unwrap() * point.push(1.0);
     assert!((rigid.x - q.x / q.z).abs() < 1e-3 && (rigid.y - q.y / q.z).abs() < 1e-3);
-    // The IMU's axes reach the camera's: ahead is +z, up is -y.
+    // The IMU's axes in the camera's: forward is +z, up is -y.
     let cam_from_imu = left.cam_from_imu.unwrap();
     assert!(cam_from_imu.rotate(&nalgebra::Vector3::x()).z > 0.99);
     assert!(cam_from_imu.rotate(&nalgebra::Vector3::z()).y < -0.99);
@@ -161,7 +158,7 @@ fn nothing_there_is_said() {
     }
     let text = refusal(empty.path());
     assert!(text.contains("it is empty"), "{text}");
-    // What was looked for, layout by layout.
+    // All known layouts are listed.
     for layout in [
         "image_02/",
         "processed_log/CAN/speed",
@@ -177,7 +174,7 @@ fn nothing_there_is_said() {
 fn what_is_there_instead_is_said() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
-    // A reader of its own says more.
+    // With the reader, the error is more precise.
     let mcap = if cfg!(feature = "ros2") {
         "not an MCAP file"
     } else {
@@ -196,7 +193,7 @@ fn what_is_there_instead_is_said() {
     for i in 0..3 {
         fs::write(at(&format!("{i}.jpg")), "x").unwrap();
     }
-    // A folder of images, but not of images.
+    // A folder of images that are invalid.
     let text = refusal(dir.path());
     assert!(text.contains("0.jpg: neither a PNG nor a JPEG"), "{text}");
     for i in 0..3 {
@@ -215,12 +212,12 @@ fn what_is_there_instead_is_said() {
     }
     let text = refusal(dir.path());
     assert!(
-        text.contains("it holds 2 recordings") && text.contains("monday)"),
+        text.contains("a folder with 2 recordings") && text.contains("monday)"),
         "{text}"
     );
     let first = at("monday");
     assert!(
-        text.contains(&format!("by itself: {};", first.display())),
+        text.contains(&format!("one of them, such as {};", first.display())),
         "{text}"
     );
     assert!(text.contains("for_folders = true"), "{text}");
@@ -233,7 +230,7 @@ fn a_folder_within_a_drive_is_recognised() {
     for inner in ["image_02", "image_02/data", "oxts"] {
         let text = refusal(&drive.join(inner));
         assert!(
-            text.contains("within the drive") && text.contains("drive_0007_sync"),
+            text.contains("part of the drive") && text.contains("drive_0007_sync"),
             "{text}"
         );
         let drive = drive.canonicalize().unwrap();
@@ -293,7 +290,7 @@ fn a_missing_or_bad_calibration_is_named() {
     fs::remove_file(&file).unwrap();
     let refused = refusal(&drive);
     assert!(
-        refused.contains("calib_cam_to_cam.txt: missing"),
+        refused.contains("calib_cam_to_cam.txt: not found"),
         "{refused}"
     );
 }
@@ -333,7 +330,7 @@ fn broken_parts_are_named() {
     fs::write(&stamps, few.join("\n")).unwrap();
     let text = refusal(&drive);
     assert!(
-        text.contains("5 time stamps (frames 0 to 4), but there is a frame 5"),
+        text.contains("5 time stamps (for frames 0 to 4), but there is a frame 5"),
         "{text}"
     );
     fs::write(&stamps, good.replacen("13:04:00.448", "13:04:aa.448", 1)).unwrap();
@@ -381,7 +378,7 @@ fn an_inspection_counts_everything() {
     assert_eq!((seen.frames, seen.size), (6, Some([62, 19])));
     assert_eq!(seen.drives[0].missing_frames, [[3, 3], [6, 6]]);
     assert_eq!((seen.drives[0].usable_pairs, seen.drives[0].scans), (3, 2));
-    // 7 intervals of 0.103 s at 10 m/s: gaps in the images are none in oxts.
+    // 7 intervals of 0.103 s at 10 m/s: oxts has no gaps where images are missing.
     assert!((seen.distance_m.unwrap() - 7.21).abs() < 1e-6);
     assert!((seen.duration_s.unwrap() - 0.721).abs() < 1e-9);
     let speed = seen.speed_mps.unwrap();
@@ -414,7 +411,7 @@ fn an_inspection_counts_everything() {
     assert_eq!(json["intrinsics"]["fx"], 36.0);
 }
 
-/// A drive that is broken hides no other of its date, and those without images of the left camera, which is trained on, are named.
+/// An invalid drive does not hide the others of its date, and drives without images of the left camera, which training uses, are named.
 #[test]
 fn an_inspection_lists_what_cannot_be_read() {
     let root = tempfile::tempdir().unwrap();
@@ -438,7 +435,7 @@ fn an_inspection_lists_what_cannot_be_read() {
     for part in ["of camera 2", "drive_0009_sync", "drive_0010_sync"] {
         assert!(warnings.contains(part), "{part}: {warnings}");
     }
-    // A camera for drives that have theirs is not theirs to be wrong.
+    // Giving a camera for drives with their own calibration is an error of the call, not of a drive.
     let given = OpenOptions {
         hfov_deg: Some(90.0),
         ..OpenOptions::default()
@@ -447,7 +444,7 @@ fn an_inspection_lists_what_cannot_be_read() {
     assert!(matches!(error, Error::OwnCalibration { .. }), "{error}");
 }
 
-/// Where none has a left one, it is the right camera; what is wrong with all of them is one error.
+/// If no drive has a left camera, the right one is inspected; an error common to all drives is reported once.
 #[test]
 fn an_inspection_takes_the_right_camera_where_no_drive_has_a_left_one() {
     let root = tempfile::tempdir().unwrap();
@@ -501,7 +498,7 @@ fn the_real_root_opens() {
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
-    /// Calibration files of any content are read or refused.
+    /// Calibration files with any content are read or refused, without a panic.
     #[test]
     fn calibration_garbage_never_panics(lines in proptest::collection::vec("(S_rect_02|P_rect_02|R_rect_00|R|T): [-0-9. e]{0,60}", 0..6)) {
         let dir = tempfile::tempdir().unwrap();

@@ -28,11 +28,11 @@ fn refusal(path: &Path) -> String {
     format!("{error}\nhint: {hint}")
 }
 
-/// `cam_from_vehicle` of the mount that is written into `dataset.toml`, as its numbers there.
+/// `cam_from_vehicle` as a mount for `dataset.toml`.
 fn mount(of: &Dataset) -> String {
     let vehicle_from_cam = of.cam_from_vehicle().unwrap().inverse();
     let place = vehicle_from_cam.translation();
-    // The camera's axes in the vehicle's: ahead, and down.
+    // The camera's forward and down axes in the vehicle's axes.
     let (ahead, down) = (
         vehicle_from_cam.rotate(&Vector3::z()),
         vehicle_from_cam.rotate(&Vector3::y()),
@@ -49,8 +49,8 @@ fn mount(of: &Dataset) -> String {
     )
 }
 
-/// The same drive, once in KITTI's layout and once as a folder with tables, is the same to training. Images are the
-/// same to the bit, motions to the nanosecond of the time stamps and the ten digits of the tables (1e-9 of some
+/// A drive in KITTI's layout and the same drive as a folder with tables are equivalent for training. Images are
+/// identical, motions agree up to the nanoseconds of the time stamps and the ten digits of the tables (1e-9 of a few
 /// metres, and of angles below 1).
 #[test]
 fn a_kitti_drive_and_a_folder_of_it_give_the_same_snippets() {
@@ -83,7 +83,7 @@ fn a_kitti_drive_and_a_folder_of_it_give_the_same_snippets() {
     }
 }
 
-/// Dates of images without a zone matter beside a log, and where nothing says when the first image was taken.
+/// Image dates without a time zone only matter with a log, and if the first image's time is not given.
 #[test]
 fn a_zone_is_asked_for_where_it_matters() {
     let root = tempfile::tempdir().unwrap();
@@ -98,14 +98,14 @@ fn a_zone_is_asked_for_where_it_matters() {
     let asks = || text_of(open(root.path()).warnings()).contains("timestamps.txt: its dates");
     assert!(asks());
     fs::write(at("dataset.toml"), "start_s = 1317042272.3\n").unwrap();
-    assert!(!asks(), "the images begin where it says");
+    assert!(!asks(), "the first image's time is given");
     fs::remove_file(at("dataset.toml")).unwrap();
     fs::remove_file(at("speed.csv")).unwrap();
-    assert!(!asks(), "there is nothing beside the images");
+    assert!(!asks(), "there is no log");
 }
 
-/// KITTI's drive 0005 again as a folder with tables, made from its oxts: every pair's motion is the same but for the
-/// body's roll and pitch, which a table of speeds and yaw rates does not know.
+/// KITTI's drive 0005 as a folder with tables made from its oxts: every pair's motion is the same except for the
+/// body's roll and pitch, which a table of speeds and yaw rates does not contain.
 #[cfg(unix)]
 #[test]
 fn a_real_drive_and_a_folder_of_it_give_the_same_snippets() {
@@ -151,13 +151,13 @@ fn a_real_drive_and_a_folder_of_it_give_the_same_snippets() {
     );
     assert_eq!((a.len(), b.len()), (153, 153));
     let tilted: f64 = a.iter().zip(&b).map(|(a, b)| same(&kitti, a, b)).sum();
-    // A tenth of a degree a pair and more, by the satellite-fused pose.
+    // A tenth of a degree per pair and more, according to the GPS-fused pose.
     assert!(tilted / 153.0 > 1e-3, "{tilted}");
     let warning = deepfusion_data::speed_unit_warning(&own).unwrap();
     assert!(warning.is_none(), "{warning:?}");
 }
 
-/// Asserts that the folder's motions `b` are those of KITTI's `a` on a body that does not roll and pitch; how far it does, in
+/// Asserts that the folder's motions `b` equal KITTI's `a` without roll and pitch; returns the largest roll and pitch in
 /// radians.
 fn same(kitti: &Dataset, a: &Snippet, b: &Snippet) -> f64 {
     assert_eq!(a.target, b.target);
@@ -236,7 +236,7 @@ fn an_inspection_reports_streams_and_what_is_assumed() {
         "{text}"
     );
     assert!(
-        text.contains("intrinsics.txt does not say for which size"),
+        text.contains("intrinsics.txt: no image size is given"),
         "{text}"
     );
     assert!(text.contains("[mount] in dataset.toml"), "{text}");
@@ -269,9 +269,7 @@ fn images_alone_open_and_say_why_they_cannot_train() {
     .unwrap();
     let error = open(root.path()).snippets(&[1], 0.5).unwrap_err();
     assert!(
-        error
-            .to_string()
-            .contains("nothing says when its frames were taken"),
+        error.to_string().contains("its frames have no times"),
         "{error}"
     );
     assert!(
@@ -326,7 +324,7 @@ fn a_calibration_of_another_size_is_refused() {
     fs::write(root.path().join("calibration.yaml"), yaml).unwrap();
     let text = refusal(root.path());
     assert!(
-        text.contains("is 62x19, its calibration says 124x38"),
+        text.contains("is 62x19, but its calibration is for 124x38"),
         "{text}"
     );
     assert!(
@@ -349,19 +347,19 @@ fn clocks_without_a_common_time_are_refused_and_can_be_joined() {
     .unwrap();
     let text = refusal(root.path());
     assert!(
-        text.contains("none in common") && text.contains("start_s"),
+        text.contains("do not overlap") && text.contains("start_s"),
         "{text}"
     );
     fs::write(root.path().join("dataset.toml"), "start_s = 1000000000.2").unwrap();
     let dataset = open(root.path());
     assert_eq!(dataset.snippets(&[1], 0.5).unwrap().len(), 7);
-    // Half of the frames beyond the speeds: the rest can be used, and it is said.
+    // Half of the frames are outside the speeds: the rest can be used, with a warning.
     fs::write(root.path().join("dataset.toml"), "start_s = 1000000001.5").unwrap();
     let seen = inspect(root.path()).unwrap();
     assert!(seen.drives[0].usable_pairs > 1 && seen.drives[0].usable_pairs < 7);
     assert!(
         seen.to_string()
-            .contains("no speed is measured about the time of"),
+            .contains("no speed was measured around the time of"),
         "{seen}"
     );
 }
@@ -409,9 +407,9 @@ fn distorted_images_are_corrected_when_they_are_loaded() {
     let dataset = open(root.path());
     let (k, image) = (dataset.intrinsics(0), dataset.load_image(0).unwrap());
     assert_eq!((k.width, k.height), image.dimensions());
-    // A barrel lens shows the middle larger: seen without it, less than the whole width is left.
+    // A barrel lens enlarges the middle, so the corrected image shows less than the full width.
     assert!(k.fx < 36.0 && k.fx > 25.0, "{k:?}");
-    // The red of a pixel is four times its column in the distorted image.
+    // A pixel's red value is four times its column in the distorted image.
     let ray = k.back_project(50.0, 9.0, 1.0);
     let r2 = ray.x * ray.x + ray.y * ray.y;
     let column = 36.0 * ray.x * (1.0 - 0.2 * r2 + 0.02 * r2 * r2) + 30.5;
@@ -425,7 +423,7 @@ fn images_and_a_video_together_need_a_word() {
     write_drive(root.path(), 3, 10.0, 0.0);
     fs::write(root.path().join("drive.mp4"), "").unwrap();
     let text = refusal(root.path());
-    assert!(text.contains("there are images and a video"), "{text}");
+    assert!(text.contains("the folder has images and a video"), "{text}");
     fs::write(root.path().join("dataset.toml"), "images = 'images'").unwrap();
     assert_eq!(open(root.path()).kind(), DatasetKind::Folder);
 }
@@ -457,13 +455,13 @@ fn a_split_selects_by_the_folders_name() {
     );
 }
 
-/// The folder is one recording, and others lie in it: that they are not read is said.
+/// Other recordings in the folder of a recording are named in a warning, since they are not read.
 #[test]
 fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
     let root = tempfile::tempdir().unwrap();
     let at = root.path();
     write_drive(at, 4, 10.0, 0.0);
-    // Parts of it, and what is none of its kind.
+    // Parts of the recording, and files that are not recordings.
     for folder in ["depth", "notes", "out"] {
         fs::create_dir(at.join(folder)).unwrap();
     }
@@ -481,7 +479,7 @@ fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
     fs::create_dir(at.join("third")).unwrap();
     fs::write(at.join("third/clip.MP4"), "").unwrap();
     let expected = format!(
-        "{} is read as image folder alone; these in it look like recordings and are not read: second, third (",
+        "{} is read only as image folder; these in it look like recordings and are not read: second, third (",
         at.display()
     );
     assert!(said(at).starts_with(&expected), "{}", said(at));
@@ -489,20 +487,20 @@ fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
     assert_eq!(passed_over, Some(said(at)));
     let noted = text_of(&inspect(at).unwrap().drives[0].warnings);
     assert!(noted.lines().any(|line| line == said(at)), "{noted}");
-    // By itself it is all there is.
+    // Given by its own path, there is no warning.
     assert_eq!(said(&at.join("second")), "");
 
-    // KITTI's drives, and a video of them; what is in a drive is its own.
+    // KITTI drives, with a video of them; files within a drive belong to it.
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     write_drive(&drive.join("extra"), 4, 10.0, 0.0);
     assert_eq!(said(root.path()), "");
-    // Of an output's name.
+    // A video with the name of an output.
     fs::write(root.path().join("drive_video.mp4"), "").unwrap();
     assert_eq!(said(root.path()), "");
     let expected = |rest: &str| {
         format!(
-            "{} is read as KITTI raw alone; {rest}",
+            "{} is read only as KITTI raw; {rest}",
             root.path().display()
         )
     };

@@ -1,4 +1,4 @@
-//! Velodyne ground truth against NumPy (`tests/reference/velodyne_numpy.py`), and its array file.
+//! Velodyne ground truth, compared with NumPy (`tests/reference/velodyne_numpy.py`), and its array file.
 
 use crate::common::{self, TinyDrive};
 use deepfusion_data::kitti::{Calibration, depth_map};
@@ -171,7 +171,7 @@ fn several_drives_or_cameras_show_in_the_names() {
     );
 }
 
-/// The field's lists are shuffled within drives, and a stack of predictions is in the list's order.
+/// Published lists are shuffled within drives, and a stack of predictions is in the list's order.
 #[test]
 fn scans_are_exported_in_the_order_of_the_split() {
     let root = tempfile::tempdir().unwrap();
@@ -200,7 +200,7 @@ fn scans_are_exported_in_the_order_of_the_split() {
     };
     let expected = lines.map(|(drive, frame)| format!("{drive}/{frame:010}"));
     assert_eq!(export(&datasets), expected);
-    // What is not of the split comes after it.
+    // Frames outside the split come after it.
     let whole = open(&root.path().join("2030_01_02/a_sync"), Cameras::Left);
     let mixed: Vec<Dataset> = whole.into_iter().chain(datasets).collect();
     let names = export(&mixed);
@@ -232,7 +232,7 @@ fn drives_of_one_name_keep_their_arrays_apart() {
     let backwards: Vec<Dataset> = both.iter().rev().cloned().collect();
     let by_order = ground_truth_names(&backwards).concat();
     assert_eq!(by_order, ["a_sync-2/0000000000", "a_sync/0000000000"]);
-    // Given twice it is one.
+    // A drive given twice is written once.
     assert_eq!(export(&[first.clone(), first].concat()), ["0000000000"]);
 }
 
@@ -304,7 +304,7 @@ fn bad_scans_are_errors_and_leave_no_file() {
 }
 
 /// KITTI's own projection of the scan of drive 0001, frame 5 (which merges eleven scans after
-/// correcting for motion) lies where ours does: at pixels both have, the median difference is small.
+/// correcting for motion) agrees with ours: at common pixels, the median difference is small.
 #[test]
 fn real_ground_truth_agrees_with_kittis_annotation() {
     let inner = "kitti_raw/2011_09_26/2011_09_26_drive_0001_sync";

@@ -1,4 +1,4 @@
-//! Drives of KITTI-360, written from a simulated street.
+//! KITTI-360 drives, written from a simulated street.
 
 use crate::common::street::{
     check_intrinsics, check_motion, check_mount, check_path, check_truth, numbers, open, rows,
@@ -20,17 +20,18 @@ fn shift(x: f64, y: f64, z: f64) -> Se3 {
     Se3::from_axis_angle(Vector3::zeros(), Vector3::new(x, y, z))
 }
 
-/// The unit's axes (x forward, y right, z down) from the vehicle's.
+/// The transform from the vehicle's axes to the unit's (x forward, y right, z down).
 fn pose_from_vehicle() -> Se3 {
     Se3::from_axis_angle(Vector3::x() * PI, Vector3::zeros())
 }
 
-/// Where the unit is, in a world far from the origin, as UTM's is.
+/// The unit's pose, in a world whose origin is far away, like UTM's.
 fn world_from_pose(street: &Simulation, frame: usize) -> Se3 {
     shift(1355.0, 3847.0, 115.0) * street.world_from_imu(frame) * pose_from_vehicle().inverse()
 }
 
-/// Writes the street as a drive. The simulator's camera is rectified camera 0; 1 is 60 cm right of it, turned by its rectification.
+/// Writes the street as a drive. The simulator's camera is rectified camera 0; camera 1 is 60 cm to its right, rotated by its
+/// rectification.
 fn write_drive(street: &Simulation, root: &Path, cameras: &[u8]) -> PathBuf {
     let calibration = root.join("calibration");
     let k = street.intrinsics();
@@ -78,7 +79,7 @@ fn write_drive(street: &Simulation, root: &Path, cameras: &[u8]) -> PathBuf {
             .collect();
         write(&place.join("timestamps.txt"), stamps);
     }
-    // The fisheyes, whose folders have the names of KITTI raw's colour cameras.
+    // The fisheye cameras, whose folders have the names of KITTI raw's colour cameras.
     fs::create_dir_all(folder.join("image_02/data_rgb")).unwrap();
     let lines = (0..street.frames())
         .map(|i| format!("{i} {}\n", numbers(rows(&world_from_pose(street, i)))));
@@ -127,7 +128,7 @@ fn a_drive_has_the_simulator_s_camera_motion_path_and_depth() {
     );
 }
 
-/// Camera 1 moves with the same car, 60 cm to the right; its truth comes through its own rectification.
+/// Camera 1 moves with the same vehicle, 60 cm to the right; its ground truth uses its own rectification.
 #[test]
 fn the_right_camera_is_where_the_files_say() {
     let root = tempfile::tempdir().unwrap();
@@ -150,7 +151,7 @@ fn the_right_camera_is_where_the_files_say() {
         off.norm() < 1e-6 && left_from_right.angle() < 1e-8,
         "{left_from_right:?}"
     );
-    // The same points, seen from another place: a scan's pixels move to the left by f · baseline / depth.
+    // The same points from another viewpoint: a scan's pixels move to the left by f · baseline / depth.
     let kind = deepfusion_data::GtKind::Z;
     let [left, right] = [0, 1].map(|i: usize| both[i].ground_truth(2, kind).unwrap().unwrap());
     let fx = both[0].intrinsics(0).fx;
@@ -161,7 +162,7 @@ fn the_right_camera_is_where_the_files_say() {
         if moved < 1.0 {
             continue;
         }
-        // Rounding moves a pixel by one at most, unless a nearer point has taken it.
+        // Rounding moves a pixel by at most one, unless a nearer point covers it.
         let near = (-1..=1).filter_map(|d| {
             right
                 .data
@@ -173,7 +174,7 @@ fn the_right_camera_is_where_the_files_say() {
     assert!(all > 1000 && found * 20 > all * 19, "{found} of {all}");
 }
 
-/// Frames that stood have no pose, and the left camera's poses serve where the unit's are absent.
+/// Frames at standstill have no pose, and the left camera's poses are used if the unit's are missing.
 #[test]
 fn poses_may_be_missing() {
     let root = tempfile::tempdir().unwrap();
@@ -196,7 +197,7 @@ fn poses_may_be_missing() {
             .map(|f| f.speed_mps.is_some())
             .collect::<Vec<_>>()
     };
-    // A frame beyond the poses' end is still about their time; in the middle of a second's gap it is not.
+    // A frame just after the last pose still has a speed; one in the middle of a gap of a second does not.
     assert!(
         known(&by_unit)[5] && known(&by_unit)[25] && !known(&by_unit)[15] && !known(&by_unit)[0]
     );
@@ -206,7 +207,7 @@ fn poses_may_be_missing() {
         .map(|p| (p.frames[0], p.frames.len()))
         .collect();
     assert_eq!(ends, [(2, 8), (20, 10)]);
-    // By the left camera's: 16 numbers of a rectified camera.
+    // The left camera's poses: 16 numbers, of a rectified camera.
     let lines = (0..30).map(|i| {
         let pose = shift(1355.0, 3847.0, 115.0) * street.world_from_cam(i);
         format!("{i} {} 0 0 0 1\n", numbers(rows(&pose)))
@@ -257,12 +258,12 @@ fn what_is_wrong_is_named_with_file_line_and_field() {
         (
             &poses,
             without(&poses, "\n1 ", "\n1.5 "),
-            "poses.txt:2: value 1: 1.5 is not a frame's number",
+            "poses.txt:2: value 1: 1.5 is not a frame number",
         ),
         (
             &poses,
             without(&poses, "\n3 ", "\n7 "),
-            "timestamps.txt: has 4 time stamps",
+            "timestamps.txt: 4 time stamps",
         ),
         (
             &perspective,

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// Camera 2 and 3 are this far left of camera 0: t = P₄ / f.
 const SHIFTS: [f64; 4] = [0.0, -0.54, 0.06, -0.47];
 
-/// Writes the street as a sequence; `cameras` are the folders, `poses` whether they are published.
+/// Writes the street as a sequence; `cameras` are the image folders, `poses` is whether poses are published.
 fn write_sequence(
     street: &Simulation,
     root: &Path,
@@ -102,7 +102,7 @@ fn a_sequence_has_the_simulator_s_camera_motion_path_and_depth() {
     assert!((dataset.frames()[7].time_s.unwrap() - street.time_s(7)).abs() < 1e-9);
     check_motion(dataset, &street, |i| i);
     check_path(dataset, &street, |i| i);
-    // The simulator's rig differs from KITTI's car by a centimetre, and the drive is too short for the car's pitch to average out.
+    // The simulator's rig differs from that of KITTI's car by a centimetre, and the drive is too short for the pitch to average out.
     let mount = dataset.cam_from_vehicle().unwrap().inverse() * street.rig().cam_from_imu();
     assert!(
         mount.angle() < 0.01 && mount.translation().norm() < 0.05,
@@ -155,7 +155,7 @@ fn cameras_fall_back_on_grey_and_every_sequence_is_opened() {
             .x
     };
     assert!((x(&all[0]) - x(&all[1]) + 0.54).abs() < 1e-9);
-    // Without poses there is no motion, and it says why; all else works.
+    // Without poses there is no motion, with an error; everything else works.
     let hidden = &all[2];
     assert!(hidden.track().is_none() && hidden.load_image(1).is_ok());
     let error = hidden.snippets(&[1], 0.5).unwrap_err();
@@ -169,7 +169,7 @@ fn monodepth2_s_splits_are_taken() {
     let root = tempfile::tempdir().unwrap();
     write_sequence(&street(4, 10.0), root.path(), "09", &[2, 3], true);
     let split = root.path().join("test_files_09.txt");
-    // As Monodepth2 writes it, and with the folder's own name.
+    // As in Monodepth2's lists, and with the folder's own name.
     fs::write(&split, "9 0 l\n9 2 r\n09 3 l\n8 1 l\n").unwrap();
     let options = OpenOptions {
         camera: Cameras::Both,
@@ -184,7 +184,7 @@ fn monodepth2_s_splits_are_taken() {
     let coverage = options.split.as_ref().unwrap().coverage(&both);
     assert_eq!((coverage.found, coverage.expected), (3, 4));
     assert_eq!(coverage.first_missing.as_deref(), Some("8 1 l"));
-    // What is in no sequence selects nothing.
+    // A frame that is in no sequence selects nothing.
     fs::write(&split, "3 1 l\n").unwrap();
     let options = OpenOptions {
         split: Some(Split::read(&split).unwrap()),
@@ -197,7 +197,7 @@ fn monodepth2_s_splits_are_taken() {
     );
 }
 
-/// The field's own lists, where they are on the machine: `sequence frame side`, as the benchmark counts.
+/// The published lists, if available: `sequence frame side`, with the benchmark's numbers.
 #[test]
 fn the_field_s_lists_are_read() {
     let Some(folder) = common::real_data("splits/odom") else {
@@ -269,7 +269,7 @@ fn what_is_wrong_is_named_with_file_line_and_field() {
         (
             &times,
             "0.0\n0.1".into(),
-            &["times.txt: has 2 time stamps", "frame 2"],
+            &["times.txt: 2 time stamps", "frame 2"],
         ),
     ];
     for (path, text, expected) in cases {
@@ -282,7 +282,7 @@ fn what_is_wrong_is_named_with_file_line_and_field() {
         assert!(error.hint().is_some(), "{error}");
         fs::write(path, good).unwrap();
     }
-    // Scans need to know where the scanner is.
+    // Scans need the scanner's mount.
     write(&folder.join("velodyne/000001.bin"), [0_u8; 32]);
     let good = fs::read_to_string(&calib).unwrap();
     fs::write(&calib, lines(&calib, 4, &|_| String::new())).unwrap();
@@ -292,7 +292,7 @@ fn what_is_wrong_is_named_with_file_line_and_field() {
         "{error}"
     );
     fs::write(&calib, good).unwrap();
-    // A missing image is a gap in the numbers, one that is cut off an error.
+    // A missing image is a gap in the numbers, a truncated one an error.
     let image = folder.join("image_2/000002.png");
     let bytes = fs::read(&image).unwrap();
     fs::remove_file(&image).unwrap();
@@ -313,7 +313,7 @@ fn what_is_wrong_is_named_with_file_line_and_field() {
     };
     let error = Dataset::open(&folder, &own).unwrap_err().to_string();
     assert!(
-        error.contains("KITTI odometry brings its own calibration"),
+        error.contains("KITTI odometry includes its own calibration"),
         "{error}"
     );
 }
@@ -336,7 +336,7 @@ fn without_times_there_are_frames_and_depth_but_no_motion() {
     assert!(hint.contains("times.txt"), "{error}: {hint}");
 }
 
-/// A folder with a `dataset.toml` is what that says, whatever its files are called.
+/// A folder with a `dataset.toml` is an image folder, whatever the names of its files.
 #[test]
 fn an_image_folder_with_such_names_stays_one() {
     let root = tempfile::tempdir().unwrap();
@@ -349,7 +349,7 @@ fn an_image_folder_with_such_names_stays_one() {
     assert_eq!(dataset.kind(), DatasetKind::Folder);
 }
 
-/// Sequences are often links to another disk: their poses lie beside the link.
+/// Sequences are often links to another disk, with their poses beside the link.
 #[cfg(unix)]
 #[test]
 fn a_linked_sequence_has_its_poses() {

@@ -1,4 +1,4 @@
-//! Correction of a lens against OpenCV and SciPy, by `reference/lens_opencv.py`.
+//! Lens correction, compared with OpenCV and SciPy (`reference/lens_opencv.py`).
 
 use deepfusion_data::{Lens, load_rgb};
 use deepfusion_geometry::{Distortion, Intrinsics};
@@ -32,11 +32,11 @@ fn corrected_images_equal_opencvs() {
         let lens = Lens::new(camera, &bent).unwrap();
         let k = lens.intrinsics();
         let found = [k.fx, k.fy, k.cx, k.cy];
-        // The same rule over the same points: only the iterations' ends differ.
+        // The same rule over the same points; only the iterations stop at different points.
         for (a, b) in found.iter().zip(numbers(block[1], 1)) {
             assert!((a - b).abs() < 1e-5, "{name}: {found:?} {b}");
         }
-        // OpenCV's own looks at fewer points of the border, which bends between them.
+        // OpenCV's function samples fewer points of the border, which is curved between them.
         for (a, b) in found.iter().zip(numbers(block[2], 1)) {
             assert!((a - b).abs() < 0.05, "{name}: {found:?} {b}");
         }
@@ -44,7 +44,7 @@ fn corrected_images_equal_opencvs() {
     }
 }
 
-/// The same of fisheye lenses, one of which sees farther than a pinhole image can.
+/// The same for fisheye lenses, one of which has a wider view than a pinhole image can.
 #[test]
 fn corrected_fisheye_images_equal_opencvs() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference");
@@ -62,7 +62,7 @@ fn corrected_fisheye_images_equal_opencvs() {
         let k = lens.intrinsics();
         let found = [k.fx, k.fy, k.cx, k.cy];
         let expected = numbers(&block[1].split_whitespace().skip(1).collect::<Vec<_>>());
-        // OpenCV's iteration ends at 1e-8 of the angle, times a focal length of some tens and tan's slope at 60 degrees, 4.
+        // OpenCV's iteration stops at 1e-8 of the angle, times a focal length of some tens and the slope 4 of tan at 60 degrees.
         for (a, b) in found.iter().zip(expected) {
             assert!((a - b).abs() < 1e-4, "{name}: {found:?} {b}");
         }
@@ -70,7 +70,7 @@ fn corrected_fisheye_images_equal_opencvs() {
     }
 }
 
-/// That the corrected image is `lens_<name>.png`.
+/// Checks that the corrected image is `lens_<name>.png`.
 fn assert_looks_like(lens: &Lens, source: &image::RgbImage, folder: &Path, name: &str) {
     let corrected = lens.correct(source.clone()).unwrap();
     let expected = load_rgb(&folder.join(format!("lens_{name}.png"))).unwrap();
@@ -78,7 +78,7 @@ fn assert_looks_like(lens: &Lens, source: &image::RgbImage, folder: &Path, name:
         .iter()
         .zip(expected.iter())
         .map(|(a, b)| a.abs_diff(*b));
-    // Coordinates of single precision may round a value that lies between two the other way.
+    // Single-precision coordinates may round a value in the other direction.
     assert!(differences.clone().max().unwrap() <= 1, "{name}");
     let other = differences.filter(|d| *d > 0).count();
     assert!(

@@ -1,4 +1,4 @@
-//! Recordings in every layout, as they are and damaged.
+//! Tests of recordings in every layout, valid and damaged.
 
 #![allow(
     clippy::unwrap_used,

@@ -40,7 +40,7 @@ fn driving_straight_moves_the_camera_by_speed_times_real_time() {
                 motion.distance_m
             );
             assert!((motion.speed_mps - 10.0).abs() < 1e-9);
-            // Ahead is +z of the camera: the world comes nearer in the frame after.
+            // The camera's +z is forward: the world is nearer in the following frame.
             let z = motion.source_from_target.unwrap().translation().z;
             let expected = -1.03 * f64::from(source.offset);
             assert!((z - expected).abs() < 1e-3, "{z}");
@@ -64,10 +64,10 @@ fn in_a_turn_the_lever_arm_shows_and_the_two_directions_are_inverse() {
     let frame0_from_frame1 = backward[0].sources[0].motion.source_from_target.unwrap();
     let both = frame1_from_frame0 * frame0_from_frame1;
     assert!(both.translation().norm() < 1e-9 && both.angle() < 1e-9);
-    // Turning left: the later camera looks to the left, so the world turns right in it (x grows).
+    // When turning left, the later camera looks further to the left, so the world moves to the right in it (x increases).
     let seen = frame1_from_frame0.rotate(&Vector3::z());
     assert!((seen.x - (0.6_f64 * 0.103).sin()).abs() < 1e-3, "{seen}");
-    // The arc from the IMU by hand: the camera sits about 1.08 m ahead of it and swings out by θ times that.
+    // The arc of the IMU, computed by hand: the camera is about 1.08 m ahead of it and swings out by θ times that.
     let (d, theta) = (0.206_f64, 0.0618_f64);
     let place = dataset.cam_from_vehicle().unwrap().inverse().translation();
     let chord = d * (theta / 2.0).sin() / (theta / 2.0);
@@ -110,7 +110,7 @@ fn a_source_is_as_far_away_as_is_asked_for() {
     let dataset = open(&TinyDrive::default().write(root.path()));
     let next = dataset.snippets(&[1], 0.5).unwrap();
     let step = next[0].sources[0].motion.distance_m;
-    // Frames are farther apart than that: as if nothing had been asked for.
+    // Frames are farther apart than this distance, so it has no effect.
     let near = dataset.snippets_apart(&[1], 0.5 * step, 0.5).unwrap();
     assert_eq!(near, next);
     for (offset, expected) in [(1, 2), (-1, -2), (2, 3)] {
@@ -127,7 +127,7 @@ fn a_source_is_as_far_away_as_is_asked_for() {
             assert!(source.motion.distance_m >= least, "{snippet:?}");
         }
     }
-    // Farther than the whole drive: nothing is left, and the error says what was looked for.
+    // A distance longer than the whole drive leaves no pair, and the error names it.
     let error = dataset.snippets_apart(&[1], 1000.0, 0.5).unwrap_err();
     assert!(error.to_string().contains("[1], 1000 m a step"), "{error}");
     assert!(error.hint().unwrap().contains("frame_distance_m"));
@@ -137,7 +137,7 @@ fn a_source_is_as_far_away_as_is_asked_for() {
 fn standing_pairs_are_dropped_and_a_standing_car_is_an_error() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
-    // Packets are 4 ms later than images: the pair (0, 1) still catches a little of packet 2's speed.
+    // Packets are 4 ms later than images, so the pair (0, 1) still includes a little of packet 2's speed.
     for n in 0..4 {
         fs::write(
             drive.join(format!("oxts/data/{n:010}.txt")),
@@ -157,7 +157,10 @@ fn standing_pairs_are_dropped_and_a_standing_car_is_an_error() {
     }
     let error = open(&drive).snippets(&[1], 0.5).unwrap_err();
     assert!(matches!(error, Error::Standing { pairs: 7, .. }), "{error}");
-    assert!(error.to_string().contains("the car stands"), "{error}");
+    assert!(
+        error.to_string().contains("the vehicle stands still"),
+        "{error}"
+    );
     assert!(error.hint().is_some());
 }
 
@@ -191,7 +194,7 @@ fn what_ego_motion_needs_is_named_when_missing() {
         } else {
             fs::remove_file(&path).unwrap();
         }
-        // Opening is enough for evaluation; training is where it is missed.
+        // Opening succeeds, which is enough for evaluation; only training needs the part.
         let dataset = open(&drive);
         let error = dataset.snippets(&[1], 0.5).unwrap_err();
         assert!(matches!(error, Error::Missing { .. }), "{part}: {error}");
@@ -274,7 +277,7 @@ fn a_split_selects_targets_but_not_their_neighbours() {
         .unwrap()
     };
     let left = open(Cameras::Left);
-    // Of five frames, once each; the right camera's and two that are nowhere are not among what was opened.
+    // Five distinct frames, of which the right camera's and two that do not exist are not in the opened data sets.
     let coverage = split.coverage(&left);
     assert_eq!((coverage.expected, coverage.found), (5, 2));
     let first = coverage.first_missing.clone().unwrap();

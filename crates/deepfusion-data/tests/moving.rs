@@ -1,4 +1,4 @@
-//! Dynamic pixels: KITTI's tracklets beside the car's own motion, and the simulator's masks.
+//! Dynamic pixels: from KITTI's tracklets with the vehicle's own motion, and from the simulator's masks.
 
 use crate::common::{TinyDrive, real_data, wall};
 use deepfusion_data::kitti::{Calibration, depth_map};
@@ -9,10 +9,10 @@ use std::fs;
 use std::path::Path;
 
 const FRAMES: u64 = 12;
-/// Metres that the car drives from frame to frame: 10 m/s for 0.103 s.
+/// Distance that the vehicle drives between frames, in metres: 10 m/s for 0.103 s.
 const STEP_M: f64 = 1.03;
 
-/// A tracklet of KITTI's format, 4 m × 2.3 m × 1.5 m; `at` gives x and y in the velodyne's axes by frame.
+/// A tracklet in KITTI's format, 4 m × 2.3 m × 1.5 m; `at` gives x and y in the velodyne's axes for a frame.
 fn tracklet(object: &str, at: impl Fn(f64) -> (f64, f64)) -> String {
     let pose = |frame: u64| {
         let (x, y) = at(frame as f64);
@@ -41,7 +41,7 @@ fn write_tracklets(drive: &Path, tracklets: &[String]) {
     fs::write(drive.join("tracklet_labels.xml"), text).unwrap();
 }
 
-/// One car that keeps its distance on the right, one that comes nearer on the left as the road does.
+/// A car on the right at a constant distance, and one on the left that approaches like the road.
 fn two_cars(drive: &Path) {
     write_tracklets(
         drive,
@@ -69,7 +69,7 @@ fn open(path: &Path) -> Dataset {
         .remove(0)
 }
 
-/// Pixels that the wall's points within 1.2 m of `y` and from 1.3 m below the velodyne to its height fall on.
+/// The pixels of the wall's points within 1.2 m of `y`, from 1.3 m below the velodyne up to its height.
 fn pixels_of_box(date: &Path, y: f32, kind: GtKind) -> Vec<bool> {
     let calibration = Calibration::read(date, Camera::Left).unwrap();
     let inside = |p: &[f32; 3]| (p[1] - y).abs() < 1.2 && (-1.3..0.1).contains(&p[2]);
@@ -83,8 +83,8 @@ fn pixels_of_box(date: &Path, y: f32, kind: GtKind) -> Vec<bool> {
     map.data.iter().map(|d| *d > 0.0).collect()
 }
 
-/// Whether a box moves is a matter of the road, not of the car that sees it: with the same boxes and a car
-/// that stands, the other one is the moving one.
+/// Boxes move relative to the road, not to the observing vehicle: with the same boxes and a vehicle at standstill,
+/// the other one is moving.
 #[test]
 fn boxes_move_over_the_ground() {
     for (speed_mps, moving_y) in [(10.0, -5.0), (0.0, 5.0)] {
@@ -108,7 +108,7 @@ fn without_labels_nothing_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive_at(folder.path(), 10.0);
     assert!(open(&drive).moving_labels().unwrap().is_none());
-    // Boxes without the car's own motion say nothing about the ground.
+    // Without the vehicle's own motion, the boxes' motion over ground is unknown.
     two_cars(&drive);
     fs::remove_dir_all(drive.join("oxts")).unwrap();
     assert!(open(&drive).moving_labels().unwrap().is_none());
@@ -164,7 +164,7 @@ fn exact_depth_is_the_simulators_and_its_sky_is_infinite() {
     };
     gray(62, 19).save(depths.join("0000000005.png")).unwrap();
     gray(60, 19).save(depths.join("0000000006.png")).unwrap();
-    // Without the simulator's masks it may be KITTI's annotation, where 0 is unknown.
+    // Without the simulator's masks, it may be KITTI's annotated depth, in which 0 means unknown.
     assert!(open(&drive).dense_depth(5).unwrap().is_none());
     fs::create_dir_all(drive.join("moving_02")).unwrap();
     let dataset = open(&drive);
@@ -175,12 +175,12 @@ fn exact_depth_is_the_simulators_and_its_sky_is_infinite() {
     assert!(dataset.dense_depth(4).unwrap().is_none());
     let error = dataset.dense_depth(6).unwrap_err().to_string();
     assert!(
-        error.contains("the exact depth is 60x19, the image 62x19"),
+        error.contains("the exact depth is 60x19, but the image is 62x19"),
         "{error}"
     );
 }
 
-/// KITTI's drive 0005: a van and a cyclist ahead all the way, parked cars in its second half.
+/// KITTI's drive 0005: a van and a cyclist ahead throughout, parked cars in the second half.
 #[test]
 fn traffic_of_a_real_drive() {
     let Some(drive) = real_data("kitti_raw/2011_09_26/2011_09_26_drive_0005_sync") else {

@@ -1,4 +1,4 @@
-//! Scenes of nuScenes, written from a simulated street.
+//! nuScenes scenes, written from a simulated street.
 
 use crate::common::street::{
     check_intrinsics, check_motion, check_mount, check_path, check_truth, open, street, write,
@@ -14,9 +14,9 @@ use std::f64::consts::FRAC_PI_2;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Microseconds since 1970 of the first image.
+/// Time of the first image, microseconds since 1970.
 const START_US: f64 = 1_532_402_927_612_460.0;
-/// The LiDAR's axes (x right, y forward, z up) from the velodyne's.
+/// The transform from the velodyne's axes to the LiDAR's (x right, y forward, z up).
 fn lidar_from_velo() -> Se3 {
     Se3::from_axis_angle(Vector3::new(0.0, 0.0, FRAC_PI_2), Vector3::zeros())
 }
@@ -38,8 +38,8 @@ fn file_of(channel: &str, us: f64, ending: &str, keyframe: bool) -> String {
     format!("{place}/{channel}/n015-2018-07-24__{channel}__{us:.0}.{ending}")
 }
 
-/// Writes the street, which has 24 frames a second, as a scene: the even frames are images (12 Hz, every sixth a keyframe), the odd ones scans, which
-/// end 42 ms later. Another scene is named whose files are elsewhere, and another camera.
+/// Writes the street, which has 24 frames per second, as a scene: the even frames are images (12 Hz, every sixth a keyframe), the odd ones
+/// scans, which end 42 ms later. The tables also list another scene, whose files do not exist, and another camera.
 fn write_scene(street: &Simulation, root: &Path) -> PathBuf {
     let tables = root.join("v1.0-mini");
     let table = |name: &str, rows: &[Value]| {
@@ -115,7 +115,7 @@ fn write_scene(street: &Simulation, root: &Path) -> PathBuf {
             "calibrated_sensor_token": token(2, sensor), "timestamp": 1, "filename": format!("samples/elsewhere/{row}.jpg"),
         }));
     }
-    // Tables have no order.
+    // The order of rows must not matter.
     data.reverse();
     table("sample.json", &samples);
     table("sample_data.json", &data);
@@ -142,7 +142,7 @@ fn a_scene_has_the_simulator_s_camera_motion_path_and_depth() {
     check_mount(&dataset, &street);
     check_motion(&dataset, &street, |i| 2 * i);
     check_path(&dataset, &street, |i| 2 * i);
-    // Half a metre of the car's way lies between an image and its scan.
+    // The vehicle drives half a metre between an image and its scan.
     let way = street.world_from_cam(20).inverse() * street.world_from_cam(21);
     assert!(way.translation().norm() > 0.2);
     check_truth(&dataset, 10, &street.frame(20).depth);
@@ -152,7 +152,7 @@ fn a_scene_has_the_simulator_s_camera_motion_path_and_depth() {
     let scans = seen.streams.iter().find(|s| s.name == "LIDAR_TOP").unwrap();
     assert!((scans.rate_hz.unwrap() - 12.0).abs() < 0.5);
     let said = text_of(dataset.warnings());
-    assert!(!said.contains("not there"), "{said}");
+    assert!(!said.contains("missing"), "{said}");
 }
 
 #[test]
@@ -160,14 +160,14 @@ fn scenes_and_frames_whose_files_are_elsewhere_are_left_out() {
     let root = tempfile::tempdir().unwrap();
     write_scene(&street(16, 24.0), root.path());
     let frames = open(root.path()).unwrap()[0].frames().to_vec();
-    // The keyframes alone, as they can be had: the numbers between them stay free.
+    // Only the keyframes, which can be downloaded separately: the numbers between them are left out.
     fs::remove_dir_all(root.path().join("sweeps")).unwrap();
     let keyframes = open(root.path()).unwrap().remove(0);
     let numbers: Vec<u64> = keyframes.frames().iter().map(|f| f.number).collect();
     assert_eq!(numbers, [0, 6]);
     assert_eq!(keyframes.frames()[1].time_s, frames[6].time_s);
     let said = text_of(keyframes.warnings());
-    assert!(said.contains("6 of 8 images are not there"), "{said}");
+    assert!(said.contains("6 of 8 images are missing"), "{said}");
     assert!(
         keyframes
             .ground_truth(1, GtKind::Velodyne)
@@ -241,7 +241,7 @@ fn what_is_wrong_is_named_with_file_line_and_field() {
             "sample_data.json",
             &pose,
             "front".into(),
-            "ego_pose_token: 'front' is no token",
+            "ego_pose_token: 'front' is not a token",
         ),
         (
             "ego_pose.json",
@@ -253,13 +253,13 @@ fn what_is_wrong_is_named_with_file_line_and_field() {
             "sensor.json",
             "CAM_FRONT",
             "CAM_LEFT".into(),
-            "channel: no sensor is CAM_FRONT",
+            "channel: no sensor is called CAM_FRONT",
         ),
     ];
     for (name, from, to, expected) in cases {
         let path = tables.join(name);
         let good = fs::read_to_string(&path).unwrap();
-        // The last one: what is said of another camera is passed over.
+        // Replace the last one: rows of another camera are ignored.
         let at = good.rfind(from).unwrap();
         let bad = good[..at].to_owned() + &to + &good[at + from.len()..];
         let line = good[..at].lines().count();
@@ -298,7 +298,7 @@ fn what_is_wrong_is_named_with_file_line_and_field() {
         "{error}"
     );
     fs::write(&path, good).unwrap();
-    // A scan that is cut off.
+    // A truncated scan.
     let sweeps = root.path().join("samples/LIDAR_TOP");
     let scan = fs::read_dir(&sweeps)
         .unwrap()
@@ -315,7 +315,7 @@ fn what_is_wrong_is_named_with_file_line_and_field() {
         error.contains("50 bytes") && error.contains("20 bytes each"),
         "{error}"
     );
-    // Two sets of tables tell of the same drives.
+    // Two sets of tables describe the same drives.
     write(&root.path().join("v1.0-trainval/sample_data.json"), "[]");
     let error = open(root.path()).unwrap_err();
     assert!(

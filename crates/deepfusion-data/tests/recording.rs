@@ -1,4 +1,4 @@
-//! A layout of somebody else's: what it takes to be a [`Dataset`].
+//! A layout from another crate: what it must implement to be a [`Dataset`].
 
 use deepfusion_data::{
     CalibrationPlace, Camera, DataWarning, Dataset, DatasetKind, DatasetParts, Error, Frame,
@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What no variant of this library's says.
+/// A warning that none of this library's variants covers.
 static WARNINGS: [DataWarning; 1] = [DataWarning::Other(Cow::Borrowed("its gyroscope was warm"))];
 
-/// Images that are made when they are asked for, as a bag's are decoded.
+/// Images that are computed on request, like a bag's are decoded.
 #[derive(Debug, Default)]
 struct Messages {
     decoded: Arc<AtomicUsize>,
@@ -66,7 +66,7 @@ impl Recording for Messages {
     }
 }
 
-/// What is nearer than 10 m moves; of the last frame nobody knows.
+/// Pixels nearer than 10 m move; the last frame has no labels.
 #[derive(Debug)]
 struct Near;
 
@@ -124,7 +124,7 @@ fn images_are_decoded_when_they_are_asked_for() {
     assert_eq!((snippets.len(), decoded.load(Ordering::Relaxed)), (3, 0));
     assert_eq!(dataset.load_image(3).unwrap().get_pixel(0, 0).0, [3; 3]);
     assert_eq!(decoded.load(Ordering::Relaxed), 1);
-    // Without turns the images' motion proves nothing about the speeds' unit: no warning either way.
+    // Without turns, the images' motion cannot contradict the speeds' unit, so there is no warning.
     assert!(speed_unit_warning(&dataset).unwrap().is_none());
 }
 
@@ -138,7 +138,7 @@ fn an_image_of_another_size_and_missing_speeds_are_reported_by_place() {
     let error = dataset.load_image(2).unwrap_err().to_string();
     assert_eq!(
         error,
-        "/recordings/a.bag, image 2: frame 2 of a is 41x30, its calibration says 40x30 \
+        "/recordings/a.bag, image 2: frame 2 of a is 41x30, but its calibration is for 40x30 \
          (/camera/camera_info in /recordings/a.bag)"
     );
     let error = dataset.snippets(&[1], 0.5).unwrap_err();

@@ -44,7 +44,7 @@ fn depth_and_poses_are_read_and_lost_ones_left_out() {
     for n in 0..5 {
         write_frame(&sequence, n);
     }
-    // The camera's file may lie above the sequences.
+    // The calibration file may be in the folder above the sequences.
     fs::write(
         root.path().join("chess/camera-intrinsics.txt"),
         "7 0 3.5\n0 7 2.5\n0 0 1\n",
@@ -58,7 +58,7 @@ fn depth_and_poses_are_read_and_lost_ones_left_out() {
     );
     let map = dataset.ground_truth(3, GtKind::Z).unwrap().unwrap();
     assert_eq!(map.data[..3], [0.0, 0.0, 1.5]);
-    // Frame 2 has no pose: two stretches remain.
+    // Frame 2 has no pose, so two segments remain.
     let paths = dataset.camera_paths().unwrap();
     assert_eq!(
         paths.iter().map(|p| p.frames.clone()).collect::<Vec<_>>(),

@@ -3,7 +3,7 @@
 use deepfusion_data::{Dataset, OpenOptions};
 use std::path::{Path, PathBuf};
 
-/// A simulated drive as bags of ROS 1 and 2, of the reader's own tests.
+/// A simulated drive as ROS 1 and ROS 2 bags, from the reader's own tests.
 fn drive(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../deepfusion-ros2bag/tests/reference/drive")
@@ -26,7 +26,7 @@ mod on {
             assert_eq!(all.len(), 1);
             assert_eq!((all[0].name(), all[0].kind()), (called, DatasetKind::Bag));
             assert_eq!(all[0].frames().len(), 10);
-            // What `bag.toml` of the folder above says, for the file within the bag's folder too: none is nearer.
+            // `bag.toml` of the folder above also applies to the file within the bag's folder, since there is none nearer.
             if name != "sqlite/sqlite.db3" {
                 assert_eq!(all[0].scenario(), Some("urban"), "{name}");
             }

@@ -56,7 +56,8 @@ fn the_mark_goes_from_layout_to_layout() {
     assert!(!Dataset::all_simulated_at(&root.join("nowhere")));
 }
 
-/// Of a date with both, each drive has its own mark, which goes with it to another date. What it does not say is the date's.
+/// In a date with real and simulated drives, each drive has its own mark, which is kept in another date. Drives without a mark have the
+/// date's.
 #[test]
 fn drives_of_one_date_are_told_apart() {
     let root = tempfile::tempdir().unwrap();
@@ -87,7 +88,7 @@ fn drives_of_one_date_are_told_apart() {
     assert_eq!(marks(), [false, true]);
 }
 
-/// What nobody can record tells it of a bag whose file is lost or says nothing; one of the two may be a better sensor's, or only named so.
+/// A bag without a mark counts as simulated if it has both topics that cannot be recorded; one of them could be a better sensor's.
 #[test]
 fn exact_motion_and_depth_are_a_simulators() {
     type Topics = fn(&mut TinyBag);
@@ -124,7 +125,7 @@ fn a_folder_says_it_in_its_file() {
     assert!(open(root.path())[0].is_simulated());
 }
 
-/// Of every layout that has such a file, without opening what is there: empty files are enough.
+/// The mark is found in every layout with such a file, without opening the recording: empty files are enough.
 #[test]
 fn the_file_of_each_layout_is_asked() {
     const DRIVE: &str = "2026_01_01/2026_01_01_drive_0001_sync";
@@ -134,7 +135,7 @@ fn the_file_of_each_layout_is_asked() {
     let [image, poses, masks, own] = [&image, &poses, &masks, &own].map(String::as_str);
     let date = "2026_01_01/dataset.toml";
     let kitti = DatasetKind::KittiRaw;
-    // What is there, the path that is given, and its file; the last is simulated where that says nothing.
+    // The files, the path given, and the configuration file; the last layout counts as simulated without a mark.
     let layouts: [(DatasetKind, &[&str], &str, &str); 10] = [
         (kitti, &[image], ".", own),
         (kitti, &[image, poses], ".", own),

@@ -1,4 +1,4 @@
-//! Speeds against images: a rendered road whose camera height is known, and real drives.
+//! Comparison of speeds with images: a rendered road with a known camera height, and real drives.
 
 use crate::common;
 use deepfusion_data::{Dataset, OpenOptions, SpeedWarning, speed_unit_warning};
@@ -34,7 +34,7 @@ fn noise(x: f64, z: f64) -> f64 {
     row(j) * (1.0 - v) + row(j + 1.0) * v
 }
 
-/// The road seen by a camera that has driven `travelled_m` and is level; grain of 0.15 and 0.6 m.
+/// The road in a level camera that has driven `travelled_m`; its texture has a grain of 0.15 and 0.6 m.
 fn render(travelled_m: f64) -> GreyImage {
     let k = camera();
     let (width, height) = (k.width as usize, k.height as usize);
@@ -59,7 +59,7 @@ fn render(travelled_m: f64) -> GreyImage {
     }
 }
 
-/// Pairs 0.5 m apart that are said to be `factor` times that.
+/// Pairs that are 0.5 m apart, with speeds for `factor` times that distance.
 fn pairs(factor: f64) -> Vec<GroundPair> {
     let texture = |i: usize| Arc::new(RoadTexture::from(&render(0.5 * i as f64)));
     let pair = |i: usize| GroundPair {
@@ -122,12 +122,12 @@ fn images_without_information_give_no_height() {
     assert_eq!(
         implied_camera_height(&up),
         None,
-        "a camera that sees no road"
+        "a camera without a view of the road"
     );
     assert_eq!(implied_camera_height(&[]), None);
 }
 
-/// A picture that stands still while the speeds say otherwise.
+/// A still image, although the vehicle moves according to the speeds.
 #[test]
 fn a_frozen_image_is_warned_of() {
     let mut frozen = pairs(1.0);
@@ -137,7 +137,7 @@ fn a_frozen_image_is_warned_of() {
     assert!(text.contains("hardly moves"), "{text}");
 }
 
-/// Real drives are silent as they are, and warned of when their OXTS speeds are rewritten as km/h.
+/// Real drives give no warning, but do when their OXTS speeds are rewritten as km/h.
 #[test]
 fn real_drives_are_distinguished_from_the_same_in_kmh() {
     for drive in ["2011_09_26_drive_0005_sync", "2011_09_26_drive_0009_sync"] {

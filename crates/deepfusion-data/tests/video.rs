@@ -1,4 +1,4 @@
-//! Videos, read by the machine's ffmpeg where it has one.
+//! Videos, read with the installed ffmpeg; skipped without one.
 
 use crate::common::text_of;
 use deepfusion_data::{Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, inspect};
@@ -11,7 +11,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Ten frames of a flat colour each, 64x48 at 10 Hz, as a video with few key frames; `None` without ffmpeg.
+/// Ten frames of a uniform colour each, 64x48 at 10 Hz, as a video with few key frames; `None` without ffmpeg.
 fn write_video(folder: &Path, name: &str) -> Option<PathBuf> {
     encode(
         folder,
@@ -38,7 +38,7 @@ fn encode(folder: &Path, name: &str, codec: &[&str]) -> Option<PathBuf> {
     match made {
         Ok(status) if status.success() => Some(video),
         _ => {
-            eprintln!("skipped: there is no ffmpeg that can write a video");
+            eprintln!("skipped: no ffmpeg that can write a video");
             None
         }
     }
@@ -56,7 +56,7 @@ fn write_tables(folder: &Path) {
     fs::write(folder.join("intrinsics.txt"), "50,50,31.5,23.5").unwrap();
 }
 
-/// An entry of GoPro's metadata, of values of `size` bytes each.
+/// An entry of GoPro's metadata, with values of `size` bytes each.
 fn entry(key: &[u8; 4], kind: u8, size: u8, value: &[u8]) -> Vec<u8> {
     let count = (value.len() / usize::from(size)) as u16;
     let mut bytes = [key.as_slice(), &[kind, size], &count.to_be_bytes(), value].concat();
@@ -64,7 +64,7 @@ fn entry(key: &[u8; 4], kind: u8, size: u8, value: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Writes into a video what a GoPro says of its lens: a letter, and the angle from corner to corner.
+/// Adds a GoPro's metadata about its lens to a video: a letter, and the angle from corner to corner.
 fn add_gopro_lens(video: &Path, letter: u8, diagonal_deg: f32) {
     let mut file = fs::read(video).unwrap();
     let at = file.windows(4).position(|w| w == b"moov").unwrap() - 4;
@@ -85,7 +85,7 @@ fn add_gopro_lens(video: &Path, letter: u8, diagonal_deg: f32) {
         b"udta",
         &boxed(b"GPMF", &entry(b"DEVC", 0, 1, &all.concat())),
     );
-    // Before those of ffmpeg, whose only user data are its own name.
+    // Before ffmpeg's user data, which only has its own name.
     let name = file.windows(4).rposition(|w| w == b"udta").unwrap() - 4;
     file.splice(name..name, ours.iter().copied());
     let grown = (length + ours.len()) as u32;
@@ -121,7 +121,7 @@ fn a_gopros_linear_lens_is_the_camera_and_a_wide_one_is_none() {
             let said = text_of(found.warnings());
             assert!(said.contains("linear lens of a HERO11 Black"), "{said}");
             assert!(!bends(&given[0]));
-            // What is given counts more.
+            // A given camera takes precedence.
             assert!((given[0].intrinsics(0).fx - 32.0 / 30_f64.to_radians().tan()).abs() < 1e-6);
         } else {
             let error = Dataset::open(&video, &OpenOptions::default()).unwrap_err();
@@ -134,7 +134,7 @@ fn a_gopros_linear_lens_is_the_camera_and_a_wide_one_is_none() {
 #[test]
 fn a_video_gives_its_frames_in_any_order() {
     let root = tempfile::tempdir().unwrap();
-    // A `%` in a path is no place for a number.
+    // A `%` in a path must not be a placeholder for a number.
     let folder = root.path().join("100% drive");
     fs::create_dir(&folder).unwrap();
     let Some(video) = write_video(&folder, "drive.mp4") else {
@@ -154,7 +154,7 @@ fn a_video_gives_its_frames_in_any_order() {
         assert!(matches!(image, FrameImage::Within { index: 7, .. }) && image.file().is_none());
         for n in [7, 0, 9, 3] {
             let image = dataset.load_image(n).unwrap();
-            // Colours pass through two codecs of 4:2:0: a few levels.
+            // Colours pass through two 4:2:0 codecs, so they differ by a few levels.
             let [r, _, b] = image.get_pixel(32, 24).0.map(i32::from);
             let n = n as i32;
             assert!(
@@ -165,7 +165,7 @@ fn a_video_gives_its_frames_in_any_order() {
         let snippets = dataset.snippets(&[1], 0.5).unwrap();
         assert_eq!(snippets.len(), 9);
     }
-    // Decoded once, beside the video; another video under its name is decoded anew.
+    // Decoded once, beside the video; another video with the same name is decoded again.
     let cache = folder.join("drive.mp4.frames");
     assert_eq!(fs::read_dir(&cache).unwrap().count(), 11);
     fs::write(cache.join("0000000000.jpg"), "broken").unwrap();
@@ -185,7 +185,7 @@ fn a_video_gives_its_frames_in_any_order() {
     assert!(seen.to_string().contains("on the tables' clock"), "{seen}");
 }
 
-/// comma2k19's videos have no time stamps: the times are in an array beside them.
+/// comma2k19's videos have no time stamps; the times are in an array beside them.
 #[test]
 fn a_comma_segment_takes_its_frames_times_from_the_log() {
     let root = tempfile::tempdir().unwrap();
@@ -214,7 +214,7 @@ fn a_comma_segment_takes_its_frames_times_from_the_log() {
         (0..100).map(|i| 46408.0 + f64::from(i) * 0.012).collect(),
     );
     write(speed.join("value"), vec![12.0; 100]);
-    // The log goes on after the video's last frame.
+    // The log continues after the video's last frame.
     let times = (0..12).map(|i| 46408.1 + f64::from(i) * 0.05).collect();
     write(root.path().join("global_pose/frame_times"), times);
     let error = Dataset::open(root.path(), &OpenOptions::default()).unwrap_err();
@@ -253,12 +253,15 @@ fn what_is_no_video_is_an_error() {
     let video = root.path().join("x.mp4");
     fs::write(&video, "no video").unwrap();
     let error = Dataset::open(&video, &OpenOptions::default()).unwrap_err();
-    // Without ffprobe, that it is needed; with it, what it says.
+    // The error is ffprobe's, or that it is missing.
     assert!(error.to_string().contains("x.mp4: ffprobe"), "{error}");
     assert!(error.hint().is_some());
     fs::write(root.path().join("y.mkv"), "another").unwrap();
     let error = Dataset::open(root.path(), &OpenOptions::default()).unwrap_err();
-    assert!(error.to_string().contains("2 videos are there"), "{error}");
+    assert!(
+        error.to_string().contains("the folder has 2 videos"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -269,16 +272,16 @@ fn pictures_become_a_video_at_their_own_times() {
     }
     let folder = root.path().join("made");
     fs::create_dir(&folder).unwrap();
-    // Thirty and sixty a second, and a pause.
+    // Thirty and sixty frames per second, and a pause.
     let times = [0.0, 1.0 / 30.0, 2.0 / 30.0, 0.2, 0.2 + 1.0 / 60.0, 0.25];
     let seconds = shown_for(&times.map(Some));
     let shown: Vec<VideoPicture> = seconds
         .into_iter()
         .enumerate()
         .map(|(i, seconds)| {
-            // Names that ffmpeg would take for a protocol, a quotation or a sequence.
+            // Names that ffmpeg would interpret as a protocol, a quotation or a sequence.
             let file = format!("12:30 it's %03d {i}.png");
-            // Of an odd size, and one that is smaller.
+            // An odd size, and a smaller image.
             let (w, h) = if i == 3 { (32, 24) } else { (65, 49) };
             let grey = RgbImage::from_pixel(w, h, Rgb([40 + 30 * i as u8; 3]));
             grey.save(folder.join(&file)).unwrap();
@@ -290,7 +293,7 @@ fn pictures_become_a_video_at_their_own_times() {
     fs::write(folder.join("intrinsics.txt"), "50,50,32,24").unwrap();
     let opened = Dataset::open(&folder.join("drive.mp4"), &OpenOptions::default()).unwrap();
     let frames = opened[0].frames();
-    // The last one is shown for its time, too, and then once more.
+    // The last frame is shown for its duration too, and then once more.
     assert_eq!(frames.len(), 7);
     for (i, expected) in times.into_iter().enumerate() {
         let time = frames[i].time_s.unwrap();
@@ -303,7 +306,7 @@ fn pictures_become_a_video_at_their_own_times() {
         let grey = image.get_pixel(33, 25)[0];
         assert!(grey.abs_diff(40 + 30 * i as u8) < 12, "{i}: {grey}");
     }
-    // What is no picture, wherever it is, is an error, and leaves nothing behind; what was there stays.
+    // An invalid image at any position is an error, and leaves nothing behind; existing files are kept.
     let before = fs::read(folder.join("drive.mp4")).unwrap();
     for broken in [0, 2] {
         let path = folder.join(&shown[broken].file);
@@ -326,7 +329,7 @@ fn pictures_become_a_video_at_their_own_times() {
     assert!(names.all(|n| !n.contains("partial") && n != "other.mp4"));
 }
 
-/// As `data import` leaves it: the video stays where it was, the tables lie in a folder of their own.
+/// As written by `data import`: the video stays in its place, and the tables are in a folder of their own.
 #[test]
 fn a_folder_has_its_own_tables_for_a_video_elsewhere() {
     let root = tempfile::tempdir().unwrap();
@@ -345,7 +348,7 @@ fn a_folder_has_its_own_tables_for_a_video_elsewhere() {
     assert_eq!(dataset.intrinsics(0).fx, 50.0);
     assert!((dataset.frames()[3].speed_mps.unwrap() - 10.0).abs() < 1e-9);
     dataset.load_image(3).unwrap();
-    // Another video of its name may keep its frames there, too.
+    // Another video with the same name may keep its frames there too.
     assert!(frames_folder(&folder, &video, "drive.mp4").is_dir());
     assert!(!folder.join("drive.mp4.frames").exists());
     assert!(!root.path().join("drive.mp4.frames").exists());

@@ -1,5 +1,5 @@
-//! A bag of ROS 2 whose cameras are video streams, as PyPI's `rosbags` wrote it (`reference/video_drive.py`), decoded by the machine's
-//! ffmpeg where it has one.
+//! A ROS 2 bag whose cameras are video streams, written by PyPI's `rosbags` (`reference/video_drive.py`) and decoded with the installed
+//! ffmpeg; skipped without one.
 
 #![cfg(feature = "ros2")]
 use deepfusion_data::{Dataset, Error, OpenOptions};
@@ -22,7 +22,7 @@ fn each_camera_s_frames_are_its_own_by_name() {
         .output()
         .is_err()
     {
-        eprintln!("skipped: there is no ffmpeg");
+        eprintln!("skipped: no ffmpeg");
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -43,13 +43,13 @@ fn each_camera_s_frames_are_its_own_by_name() {
     for (topic, focal) in [("/front/video", 60.0), ("/rear/image_raw/ffmpeg", 50.0)] {
         let drive = open(&bag, &[&format!("image={topic}")]).unwrap();
         assert_eq!(drive.frames().len(), 12);
-        // CameraInfo is that of the camera's own name.
+        // CameraInfo comes from the camera's own namespace.
         assert_eq!(drive.intrinsics(0).fx, focal, "{topic}");
         for n in [7, 0, 11, 3] {
             let time_s = drive.frames()[n].time_s.unwrap();
             assert!((time_s - 0.1 * n as f64).abs() < 1e-9, "{n}: {time_s}");
             let image = drive.load_image(n).unwrap();
-            // Two codecs with rounded colours in a narrower range: a few levels.
+            // Two codecs round colours in a narrower range, so they differ by a few levels.
             let [r, g, b] = image.get_pixel(32, 24).0.map(i32::from);
             let n = n as i32;
             let apart = [r - 20 * n, g - 120, b - (200 - 20 * n).max(0)];
@@ -59,7 +59,7 @@ fn each_camera_s_frames_are_its_own_by_name() {
         let cache = format!("drive.{}.frames", topic.trim_matches('/').replace('/', "."));
         assert_eq!(fs::read_dir(folder.path().join(cache)).unwrap().count(), 13);
     }
-    // A bag that is written to makes its frames anew; the file with its settings does not.
+    // Frames are decoded again if the bag changes, but not if the file with its settings does.
     let cache = folder.path().join("drive.front.video.frames");
     let harmed = cache.join("0000000003.jpg");
     fs::write(&harmed, "broken").unwrap();

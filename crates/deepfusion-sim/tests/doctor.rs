@@ -543,7 +543,7 @@ fn a_bag_whose_camera_clock_is_off_is_reported() {
         let offset = seen.drives[0].time_offset.unwrap();
         assert_eq!(offset.vehicle_minus_camera_s, value(finding));
         assert!(offset.std_error_s < 0.05, "{offset:?}");
-        assert!(seen.to_string().contains("vehicle less camera"), "{seen}");
+        assert!(seen.to_string().contains("vehicle minus camera"), "{seen}");
         assert!((value(finding) + ahead_s).abs() < 0.010, "{finding:?}");
     }
 }

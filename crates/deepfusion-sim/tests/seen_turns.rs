@@ -95,7 +95,7 @@ fn images_show_how_the_vehicle_turned() {
         let said: Vec<String> = alone.warnings().iter().map(ToString::to_string).collect();
         let said = said.join("\n");
         assert!(
-            said.contains("taken from the images") && !said.contains("no yaw rate"),
+            said.contains("estimating them from the images") && !said.contains("no yaw rate"),
             "{said}"
         );
         let turned_off: Vec<f64> = (1..60)

@@ -211,8 +211,8 @@ fn a_wrong_topic_of_dynamic_points_is_an_error() {
         try_open(&path)
     };
     for (topic, problem) in [
-        ("/no/such/topic", "has no topic /no/such/topic"),
-        (topic::IMU, "holds sensor_msgs/Imu"),
+        ("/no/such/topic", "no topic /no/such/topic"),
+        (topic::IMU, "wrong type sensor_msgs/Imu"),
     ] {
         let error = name(topic).unwrap_err();
         assert!(error.to_string().contains(problem), "{error}");

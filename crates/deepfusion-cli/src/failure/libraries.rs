@@ -188,7 +188,7 @@ impl Reportable for deepfusion_data::Error {
                 field,
                 calibration: CalibrationSource::Given,
             } => format!(
-                "{image}: frame {frame} of {drive} is {}x{}, its calibration says {}x{} ({field} in --intrinsics)",
+                "{image}: frame {frame} of {drive} is {}x{}, but its calibration is for {}x{} ({field} in --intrinsics)",
                 found.0, found.1, expected.0, expected.1
             ),
             _ => self.to_string(),

@@ -222,7 +222,7 @@ mod tests {
         };
         let hint = Failure::from(error).hint().unwrap();
         assert!(hint.contains("--topic imu=none"), "{hint}");
-        assert!(hint.contains("(in drive.toml)"), "{hint}");
+        assert!(hint.contains("in drive.toml"), "{hint}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! A camera from the file that a calibration tool wrote.
+//! A camera read from a calibration tool's file.
 
 use super::lens::Lens;
 use super::numbers::{self, Numbers};
@@ -8,30 +8,30 @@ use crate::{CalibrationPlace, Error, Result};
 use deepfusion_geometry::{Distortion, Intrinsics};
 use std::path::Path;
 
-/// What a calibration file says of a camera.
+/// A camera according to its calibration file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraCalibration {
-    /// Of the images as the camera gives them, before any correction, in pixels.
+    /// Intrinsics of the original images, before any correction, in pixels.
     pub intrinsics: Intrinsics,
-    /// The lens.
+    /// Distortion of the lens.
     pub distortion: Distortion,
-    /// Whether the image's size is said, or does not matter (an angle of view); else it was taken from the images.
+    /// Whether the calibration states the image size, or does not need it (an angle of view); otherwise it was taken from the images.
     pub size_in_file: bool,
-    /// What said it.
+    /// Where the calibration comes from.
     pub source: CalibrationSource,
-    /// Whether nothing said it ([`crate::OpenOptions::assumed_camera`]).
+    /// Whether the camera is only assumed, for lack of a calibration ([`crate::OpenOptions::assumed_camera`]).
     pub assumed: bool,
 }
 
 impl CameraCalibration {
     /// Reads OpenCV's FileStorage YAML (`camera_matrix`, `distortion_coefficients`), ROS `camera_info` YAML
     /// (from `camera_calibration`, or a printed message), Kalibr's camchain YAML (the first camera), or a
-    /// text file of four numbers fx, fy, cx, cy or of the nine of a camera matrix. Where it does not
-    /// say the image's size, that is `image_size`.
+    /// text file with four numbers fx, fy, cx, cy or the nine of a camera matrix. `image_size` is used if the
+    /// file does not state a size.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::CameraFile`] for a file of another kind, a lens model
-    /// other than Brown and Conrady's and the fisheye model of Kannala and Brandt, or numbers that make no camera.
+    /// [`Error::File`]; [`Error::CameraFile`] for a file of another kind, a lens model other than
+    /// Brown-Conrady and the Kannala-Brandt fisheye model, or implausible intrinsics.
     pub fn read(path: &Path, image_size: (u32, u32)) -> Result<Self> {
         let text = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         let text = String::from_utf8_lossy(&text);
@@ -49,10 +49,10 @@ impl CameraCalibration {
         Self::from_numbers(numbers, image_size, path.into())
     }
 
-    /// A pinhole camera of four given numbers; `source` gave them.
+    /// A pinhole camera with the four numbers given, which come from `source`.
     ///
     /// # Errors
-    /// [`Error::CameraFile`] where they make no camera.
+    /// [`Error::CameraFile`] if they are implausible.
     pub fn given(
         pinhole: [f64; 4],
         image_size: (u32, u32),
@@ -66,7 +66,7 @@ impl CameraCalibration {
         Self::from_numbers(numbers, image_size, source)
     }
 
-    /// The same, known to hold for images of any size where `any`, as an angle of view does.
+    /// The same camera; if `any`, it applies to images of any size, as an angle of view does.
     pub(crate) fn for_any_size(self, any: bool) -> Self {
         Self {
             size_in_file: self.size_in_file || any,
@@ -96,22 +96,22 @@ impl CameraCalibration {
         })
     }
 
-    /// The place that says the image's size, for errors.
+    /// Where the image size comes from, for errors.
     pub(crate) fn place(&self) -> CalibrationPlace {
         CalibrationPlace {
             source: self.source.clone(),
             field: if self.size_in_file {
-                "the image's size"
+                "the image size"
             } else {
-                "the first image's size, for want of one"
+                "the first image's size, as none is given"
             },
         }
     }
 
-    /// The correction of its images.
+    /// The lens correction for its images.
     ///
     /// # Errors
-    /// [`Error::CameraFile`] where matrix and distortion do not fit each other.
+    /// [`Error::CameraFile`] if camera matrix and distortion do not fit each other.
     pub fn lens(&self) -> Result<Lens> {
         Lens::new(self.intrinsics, &self.distortion).map_err(|problem| Error::CameraFile {
             by: self.source.clone(),

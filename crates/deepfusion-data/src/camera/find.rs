@@ -1,4 +1,4 @@
-//! Where a recording's camera is looked for.
+//! Finds a recording's camera calibration.
 
 use super::calibration::CameraCalibration;
 use super::source::CalibrationSource;
@@ -22,10 +22,10 @@ const NAMES: [&str; 8] = [
     "calibration.txt",
 ];
 
-/// KITTI raw's, which lies above its drives.
+/// KITTI raw's calibration file, which lies above the drives.
 const OF_A_DATE: &str = "calib_cam_to_cam.txt";
 
-/// A calibration that lies beside an image, in the folder above, or, as KITTI's, some folders further up. It is not read.
+/// The path of a calibration file beside an image, in the folder above or, for KITTI, some folders further up. The file is not read.
 #[must_use]
 pub fn calibration_near(image: &Path) -> Option<PathBuf> {
     let image = std::path::absolute(image).ok()?;
@@ -38,20 +38,20 @@ pub fn calibration_near(image: &Path) -> Option<PathBuf> {
     files.find(|file| file.is_file())
 }
 
-/// What a camera made, and may have described itself in.
+/// The files from a camera, which may contain a description of it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Pictures<'a> {
     /// Images, which may have an EXIF block.
     Images(&'a [PathBuf]),
-    /// A video, and what it says of a GoPro's lens.
+    /// A video, and its entry about a GoPro's lens, if any.
     Video(&'a Path, Option<&'a GoproLens>),
 }
 
-/// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside them, or given or in a file in the folder above. Else
-/// what the `pictures` say themselves, and where nothing says it the one that is to be assumed; both become one of the `warnings`.
+/// The camera of images of the given size. In order of precedence: given by the caller, given in `dataset.toml`, read from a file beside
+/// the images, the same two in the folder above, described in the `pictures` themselves, assumed. The last two add a warning to `warnings`.
 ///
 /// # Errors
-/// [`Error::NoCameraFile`] where nothing says it; [`Error::CameraFile`], [`Error::Config`].
+/// [`Error::NoCameraFile`] if there is none of these; [`Error::CameraFile`], [`Error::Config`].
 pub(crate) fn find_camera(
     folder: &Path,
     config: &FolderConfig,
@@ -113,7 +113,7 @@ pub(crate) fn find_camera(
     }
 }
 
-/// The camera that a `dataset.toml` says in numbers.
+/// The camera given as numbers in a `dataset.toml`.
 fn in_numbers(config: &FolderConfig, size: (u32, u32)) -> Result<Option<CameraCalibration>> {
     let by = CalibrationSource::from(config.path.as_path());
     if let Some(given) = config.intrinsics {
@@ -126,13 +126,13 @@ fn in_numbers(config: &FolderConfig, size: (u32, u32)) -> Result<Option<CameraCa
     Ok(Some(given.for_any_size(true)))
 }
 
-/// How many images of a recording are asked whether the camera stayed as it was.
+/// How many images of a recording are checked for the same focal length.
 const ASKED: usize = 9;
 
-/// The camera that the images' EXIF blocks say, and a warning that they do; `None` where the first says nothing.
+/// The camera according to the images' EXIF blocks, with a warning about that; `None` if the first image's block does not describe it.
 ///
 /// # Errors
-/// [`Error::CameraFile`] where another image, of those asked, was taken with another focal length.
+/// [`Error::CameraFile`] if another of the images checked was taken with another focal length.
 fn by_exif(
     images: &[PathBuf],
     size: (u32, u32),
@@ -143,7 +143,7 @@ fn by_exif(
     };
     let asked = (1..ASKED).map(|i| &images[i * (images.len() - 1) / (ASKED - 1)]);
     for (other, camera) in asked.filter_map(|path| Some((path, said(path)?))) {
-        // A focal length in 35 mm film is of whole millimetres.
+        // The 35 mm equivalent focal length is in whole millimetres.
         if (camera.intrinsics.fx / first.intrinsics.fx - 1.0).abs() > 1e-6 {
             return Err(Error::CameraFile {
                 by: other.as_path().into(),
@@ -173,7 +173,7 @@ fn by_exif(
     Ok(Some((calibration, warning)))
 }
 
-/// The camera that a GoPro's video says, and a warning that it does; `None` for another than the linear lens.
+/// The camera according to a GoPro's video, with a warning about that; `None` for lenses other than the linear one.
 fn by_gopro(
     file: &Path,
     lens: &GoproLens,

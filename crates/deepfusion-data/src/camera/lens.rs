@@ -1,4 +1,4 @@
-//! Taking a lens' distortion out of images.
+//! Corrects a lens' distortion in images.
 
 use crate::{Error, NoLens, Result};
 use deepfusion_geometry::{DepthMap, Distortion, Intrinsics};
@@ -7,25 +7,24 @@ use std::sync::Arc;
 
 /// Turns a camera's images into those of a pinhole camera, of the same size and without invalid pixels.
 ///
-/// The pinhole camera is the one that sees the largest upright rectangle whose every ray is in the image,
-/// stretched to the image's size, as OpenCV's `getOptimalNewCameraMatrix` with `alpha = 0` does (fx and fy
-/// may then differ). Nothing black can appear at a border, where training would take it for the world. Of a fisheye lens that sees
-/// more, only what lies within 60 degrees of the axis to each side is kept: towards 90 degrees a pinhole camera's image has no end.
+/// The pinhole camera sees the largest upright rectangle whose rays are all in the image, stretched to the
+/// image's size, like OpenCV's `getOptimalNewCameraMatrix` with `alpha = 0` (fx and fy may then differ).
+/// So no black pixels appear at the borders, which training would take for a part of the scene. For a fisheye lens,
+/// at most 60 degrees to each side of the axis are kept: a pinhole camera's image grows without bound towards 90 degrees.
 #[derive(Debug, Clone)]
 pub struct Lens {
-    /// Of the image after correction.
+    /// Intrinsics of the corrected image.
     pinhole: Intrinsics,
-    /// For each pixel of the corrected image, where it lies in the original one; `None` without
+    /// For each pixel of the corrected image, its position in the original one; `None` without
     /// distortion.
     map: Option<Arc<Vec<[f32; 2]>>>,
 }
 
 impl Lens {
-    /// The correction of a camera with `distortion`, whose matrix `camera` is that of the images as they
-    /// are.
+    /// The correction for a camera with `distortion` and the intrinsics `camera` of the original images.
     ///
     /// # Errors
-    /// [`NoLens`], where the coefficients fold the image's border over: they belong to another camera, or
+    /// [`NoLens`] if the coefficients fold the image's border over: they belong to another camera, or
     /// to images of another size.
     pub fn new(camera: Intrinsics, distortion: &Distortion) -> std::result::Result<Self, NoLens> {
         if distortion.is_none() {
@@ -41,7 +40,7 @@ impl Lens {
             for u in 0..camera.width {
                 let ideal = pinhole.back_project(f64::from(u), f64::from(v), 1.0).xy();
                 let seen = distortion.distort(&ideal);
-                // Between the border's sampled rays the rectangle may reach out by a fraction of a pixel.
+                // Between the rays sampled along the border, the rectangle may exceed the image by a fraction of a pixel.
                 map.push([
                     (camera.fx * seen.x + camera.cx).clamp(0.0, f64::from(right)) as f32,
                     (camera.fy * seen.y + camera.cy).clamp(0.0, f64::from(bottom)) as f32,
@@ -60,16 +59,16 @@ impl Lens {
         self.pinhole
     }
 
-    /// Whether there is anything to correct.
+    /// Whether the camera has a distortion to correct.
     #[must_use]
     pub fn distorts(&self) -> bool {
         self.map.is_some()
     }
 
-    /// The corrected image, bilinear between pixels.
+    /// The corrected image, with bilinear interpolation.
     ///
     /// # Errors
-    /// [`Error::Size`] for an image of another size than the camera's.
+    /// [`Error::Size`] if the image's size differs from the camera's.
     pub fn correct(&self, image: RgbImage) -> Result<RgbImage> {
         let (width, height) = (self.pinhole.width, self.pinhole.height);
         let Some(map) = &self.map else {
@@ -103,12 +102,12 @@ impl Lens {
         Ok(corrected)
     }
 
-    /// The corrected depth map (camera z, which a lens does not change), each pixel from its nearest: a
-    /// mean over an edge would be a depth that is nowhere. A map of the images' shape in another size, as of a phone's depth sensor, is taken
-    /// for what the whole image shows.
+    /// The corrected depth map (camera z, which a lens does not change), with nearest-neighbour interpolation: a
+    /// mean across an edge would be a depth that does not exist. A map with the images' aspect ratio but another size, such as a phone
+    /// depth sensor's, is assumed to cover the whole image.
     ///
     /// # Errors
-    /// [`Error::Size`] for a map of another shape than the camera's images.
+    /// [`Error::Size`] if the map's aspect ratio differs from that of the camera's images.
     pub fn correct_depth(&self, depth: DepthMap) -> Result<DepthMap> {
         let (width, height) = (self.pinhole.width as usize, self.pinhole.height as usize);
         let depth = if same_shape(&depth, width, height) {
@@ -133,8 +132,8 @@ impl Lens {
     }
 }
 
-/// Whether a depth map has an image's aspect ratio, as nearly as whole pixels of it can. One that has the image's width or height
-/// alone was cut, and shows another part.
+/// Whether a depth map has an image's aspect ratio, up to rounding to whole pixels. A map with only the image's width or only its height
+/// was cropped, and shows a part of the image.
 fn same_shape(depth: &DepthMap, width: usize, height: usize) -> bool {
     let whole = depth.width > 0 && depth.height > 0;
     if !whole || (depth.width == width) != (depth.height == height) {
@@ -145,7 +144,7 @@ fn same_shape(depth: &DepthMap, width: usize, height: usize) -> bool {
     off < width as f64 && off < height as f64
 }
 
-/// The map in another size, each pixel the depth of the one in which its centre lies.
+/// The map in another size; each pixel has the depth of the old pixel that contains its centre.
 fn resized(depth: DepthMap, width: usize, height: usize) -> DepthMap {
     if (depth.width, depth.height) == (width, height) {
         return depth;
@@ -161,16 +160,16 @@ fn resized(depth: DepthMap, width: usize, height: usize) -> DepthMap {
     }
 }
 
-/// How far to each side a pinhole image of a fisheye lens reaches at most: tan 60°.
+/// Largest extent to each side of a pinhole image from a fisheye lens: tan 60°.
 const WIDEST: f64 = 1.732_050_807_568_877_2;
 
-/// The pinhole camera of the largest rectangle of rays that are all in the image.
+/// The pinhole camera that sees the largest rectangle of rays that are all in the image.
 fn largest_valid(
     camera: &Intrinsics,
     distortion: &Distortion,
 ) -> std::result::Result<Intrinsics, NoLens> {
     let (right, bottom) = (f64::from(camera.width - 1), f64::from(camera.height - 1));
-    // Calibrations often fold over in the corners, where no board was seen: such pixels have no ray, and
+    // Calibrations often fold over in the corners, where the board was never seen. Such pixels have no ray, and
     // the rectangle does not need them.
     let ray = |u: f64, v: f64| distortion.undistort(&camera.back_project(u, v, 1.0).xy());
     let rows = || (0..camera.height).map(f64::from);
@@ -182,7 +181,7 @@ fn largest_valid(
     let [left_x, top_y] = [left_x.reduce(f64::max), top_y.reduce(f64::max)];
     let [right_x, bottom_y] = [right_x.reduce(f64::min), bottom_y.reduce(f64::min)];
     let [left_x, top_y, right_x, bottom_y] = if distortion.fisheye.is_some() {
-        // A border without a ray is 90 degrees from the axis or more, where the widest image ends long before.
+        // A border pixel without a ray is at least 90 degrees from the axis, far outside the widest image.
         let limit = |side: Option<f64>, widest: f64| {
             let side = side.unwrap_or(widest);
             Some(if side.abs() > WIDEST { widest } else { side })
@@ -212,7 +211,7 @@ fn largest_valid(
     if let Some(why) = pinhole.implausible() {
         return Err(NoLens::Implausible(why));
     }
-    // Its corners are its farthest rays. They must be what the lens shows where it shows them.
+    // The corners are the rectangle's outermost rays. Distorting and undistorting them must give them back.
     for (u, v) in [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)] {
         let corner = pinhole.back_project(u, v, 1.0).xy();
         let back = distortion.undistort(&distortion.distort(&corner));
@@ -250,7 +249,7 @@ mod tests {
 
     #[test]
     fn coefficients_of_another_camera_are_refused() {
-        // x(1 - 2x²) is 0.27 at most; the image's sides are at 0.48 and more.
+        // x(1 - 2x²) is at most 0.27; the image's sides are at 0.48 and more.
         let fold = Distortion::from_opencv(&[-2.0, 0.0, 0.0, 0.0]).unwrap();
         assert_eq!(Lens::new(camera(), &fold).unwrap_err(), NoLens::FoldsOver);
     }
@@ -279,7 +278,7 @@ mod tests {
         }
     }
 
-    /// A map of half the size, and one of three quarters, whose pixels are no whole number of the image's.
+    /// A map of half the image's size, and one of three quarters, whose pixels do not align with the image's.
     #[test]
     fn a_depth_map_of_the_same_shape_is_enlarged() {
         let straight = Lens::new(camera(), &Distortion::from_opencv(&[0.0; 4]).unwrap()).unwrap();
@@ -297,15 +296,15 @@ mod tests {
         // Centres at 0.375, 1.125, 1.875, 2.625 of the map's pixels.
         assert_eq!(most.data[..8], [0.0, 1.0, 1.0, 2.0, 3.0, 4.0, 4.0, 5.0]);
         assert_eq!(most.data[80 * 59], 44.0 * 60.0);
-        // A larger map is thinned out.
+        // A larger map is subsampled.
         let twice = straight.correct_depth(map(160, 120)).unwrap();
         assert_eq!(twice.data[..3], [161.0, 163.0, 165.0]);
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
-        /// A point in the world is at one place before and after: where the corrected camera's pinhole
-        /// sees it, the map points to where the lens shows it. And no pixel looks beyond the image.
+        /// The map takes a point's pixel in the corrected pinhole image to its pixel in the original image, and
+        /// never points outside the original image.
         #[test]
         fn corrected_pixels_see_their_rays(
             k1 in -0.2..0.3f64, k2 in -0.02..0.05f64, p1 in -0.003..0.003f64, p2 in -0.003..0.003f64,
@@ -318,7 +317,7 @@ mod tests {
             let pixel = [60.0 * seen.x + 41.0, 58.0 * seen.y + 28.0];
             let mapped = lens.map.as_ref().unwrap()[(v * 80 + u) as usize];
             for (a, (b, size)) in pixel.into_iter().zip(mapped.into_iter().zip([80.0, 60.0])) {
-                // Clamping moves a pixel by 1e-3 at most, single precision by 1e-5.
+                // Clamping moves a pixel by at most 1e-3, single precision by 1e-5.
                 prop_assert!((a - f64::from(b)).abs() < 1e-3, "{pixel:?} {mapped:?}");
                 prop_assert!(a > -1e-3 && a < size - 1.0 + 1e-3);
             }

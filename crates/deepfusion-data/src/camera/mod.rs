@@ -1,4 +1,4 @@
-//! A camera by its calibration, and images freed of its lens' distortion.
+//! A camera's calibration, and the correction of its lens' distortion.
 
 mod calibration;
 mod find;

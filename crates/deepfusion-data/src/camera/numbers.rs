@@ -1,9 +1,9 @@
-//! Plain numbers: fx, fy, cx, cy, or a camera matrix row by row.
+//! A calibration as plain numbers: fx, fy, cx, cy, or a camera matrix row by row.
 
 use crate::CalibrationFileProblem;
 use deepfusion_geometry::Distortion;
 
-/// The numbers in a file, which may lack the image's size.
+/// The numbers in a calibration file, which may lack the image size.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Numbers {
     /// fx, fy, cx, cy.
@@ -12,7 +12,7 @@ pub(super) struct Numbers {
     pub(super) size: Option<(u32, u32)>,
 }
 
-/// Reads four or nine numbers, apart by commas, spaces or lines; `#` begins a comment.
+/// Reads four or nine numbers, separated by commas, spaces or line breaks; `#` begins a comment.
 pub(super) fn parse(text: &str) -> Result<Numbers, CalibrationFileProblem> {
     let lines = text.lines().map(|l| l.split('#').next().unwrap_or(""));
     let mut numbers = Vec::new();
@@ -69,7 +69,7 @@ mod tests {
         for (bad, why) in [
             ("1 2 3", "3 numbers"),
             ("1 2 x 4", "'x'"),
-            ("1 2 3 4 5 6 7 8 9", "no camera matrix"),
+            ("1 2 3 4 5 6 7 8 9", "not of the form"),
             ("1 2 nan 4", "'nan'"),
             ("1 2 3 4 5 6 7 8 9 10", "more than nine"),
         ] {

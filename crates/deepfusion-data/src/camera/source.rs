@@ -1,14 +1,14 @@
-//! Who says what a camera is.
+//! Where a camera's calibration comes from.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// What says a camera.
+/// Where a camera's calibration comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CalibrationSource {
     /// The caller ([`crate::OpenOptions::intrinsics`], [`crate::OpenOptions::hfov_deg`]).
     Given,
-    /// A file.
+    /// A file with this path.
     File(PathBuf),
 }
 

@@ -1,10 +1,11 @@
-//! A camera as the file that other programs read.
+//! A camera as a calibration file for other programs.
 
 use deepfusion_geometry::{Distortion, Intrinsics};
 use std::fmt::Write as _;
 
-/// A camera as ROS's `camera_info` YAML, which [`crate::CameraCalibration::read`], ROS and most tools read: model `equidistant` for a
-/// fisheye lens, `rational_polynomial` where it needs eight coefficients, else `plumb_bob`. `comments` stand at its top, a line each.
+/// A camera as ROS `camera_info` YAML, which [`crate::CameraCalibration::read`], ROS and most tools read. The model is `equidistant` for a
+/// fisheye lens, `rational_polynomial` if eight coefficients are needed, otherwise `plumb_bob`. Each of `comments` becomes a line at the
+/// top.
 #[must_use]
 pub fn camera_info_yaml(
     name: &str,
@@ -25,7 +26,7 @@ pub fn camera_info_yaml(
         let _ = writeln!(text, "# {line}");
     }
     let (fx, fy, cx, cy) = (camera.fx, camera.fy, camera.cx, camera.cy);
-    // A name is a word in quotes, whatever it was taken from.
+    // Make the name safe inside quotes, whatever characters it has.
     let name: String = name
         .chars()
         .map(|c| if c.is_alphanumeric() { c } else { '_' })
@@ -67,7 +68,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// What is written is read again, to the last digit.
+        /// The file is read back with all digits.
         #[test]
         fn it_is_read_again(
             pinhole in proptest::array::uniform4(50.0..500.0f64), k in proptest::collection::vec(-0.5..0.5f64, 8), kind in 0..4usize,

@@ -1,4 +1,4 @@
-//! The YAML of OpenCV, ROS and Kalibr.
+//! Reads calibration YAML of OpenCV, ROS and Kalibr.
 
 use super::numbers::Numbers;
 use crate::CalibrationFileProblem;
@@ -6,13 +6,13 @@ use deepfusion_geometry::Distortion;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// Longest file that is looked at, in bytes: calibrations have some hundred.
+/// Longest file that is parsed, in bytes; a calibration has some hundred.
 const LONGEST: usize = 1 << 20;
 
-/// Names of the fisheye model after Kannala and Brandt: ROS's and Kalibr's, OpenCV's.
+/// Names of the Kannala-Brandt fisheye model: in ROS and Kalibr, and in OpenCV.
 pub(crate) const FISHEYE: [&str; 2] = ["equidistant", "fisheye"];
 
-/// Keys of OpenCV's and ROS's files, in the spellings that their tools use.
+/// Keys of OpenCV's and ROS's files, in the spellings of their tools.
 #[derive(Debug, Default, Deserialize)]
 struct Flat {
     #[serde(alias = "width", alias = "Image_width")]
@@ -40,7 +40,7 @@ struct Flat {
     fisheye_model: Option<u32>,
 }
 
-/// A matrix as a list, or with rows, columns and data.
+/// A matrix, as a plain list or with rows, columns and data.
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
 enum Matrix {
@@ -63,7 +63,7 @@ struct Kalibr {
     resolution: Option<[u32; 2]>,
 }
 
-/// Reads whichever of the three it is.
+/// Reads any of the three formats.
 pub(super) fn parse(text: &str) -> Result<Numbers, CalibrationFileProblem> {
     if text.len() > LONGEST {
         return Err(CalibrationFileProblem::TooLong);
@@ -79,7 +79,7 @@ pub(super) fn parse(text: &str) -> Result<Numbers, CalibrationFileProblem> {
     flat(serde_saphyr::from_str(&text).map_err(bad)?)
 }
 
-/// OpenCV begins with `%YAML:1.0`, which is no YAML, and tags matrices with a type of its own.
+/// The text without what is not standard YAML: OpenCV begins files with `%YAML:1.0`, and tags matrices with its own type.
 fn plain(text: &str) -> String {
     let lines = text
         .lines()
@@ -118,7 +118,7 @@ fn flat(file: Flat) -> Result<Numbers, CalibrationFileProblem> {
         None => Vec::new(),
     };
     let size = file.image_width.zip(file.image_height);
-    // A message of a camera that does not know its size says 0.
+    // A size of 0 in a message means unknown.
     Ok(numbers(
         [fx, fy, cx, cy],
         lens(&coefficients, fisheye)?,

@@ -1,7 +1,7 @@
 use super::*;
 use proptest::prelude::*;
 
-/// As `cv2.FileStorage` of OpenCV 4 writes it.
+/// As written by `cv2.FileStorage` of OpenCV 4.
 const OPENCV: &str = "%YAML:1.0
 ---
 image_width: 640
@@ -39,7 +39,7 @@ distortion_coefficients: !!opencv-matrix
    data: [ 1.0e-02, -2.0e-02, 3.0e-02, -4.0e-03 ]
 ";
 
-/// As ROS's camera_calibration writes it.
+/// As written by ROS's camera_calibration.
 const ROS: &str = "image_width: 2448
 image_height: 2050
 camera_name: prosilica
@@ -58,7 +58,7 @@ rectification_matrix:
   data: [1, 0, 0, 0, 1, 0, 0, 0, 1]
 ";
 
-/// As Kalibr writes it.
+/// As written by Kalibr.
 const KALIBR: &str = "cam0:
   cam_overlaps: [1]
   camera_model: pinhole
@@ -121,7 +121,7 @@ fn fisheye_lenses_are_read() {
         Some([-0.2834, 0.0739, 0.00019, 1.76e-05])
     );
     assert_eq!(kalibr.distortion.radial, [0.0; 3]);
-    // As OpenCV's sample program for calibrations writes it with fisheye lenses.
+    // As written by OpenCV's sample program for calibration of fisheye lenses.
     let opencv = parse(FISHEYE_OPENCV).unwrap();
     assert_eq!(opencv.distortion.fisheye, Some([0.01, -0.02, 0.03, -0.004]));
     assert_eq!(opencv.pinhole, [350.0, 351.0, 320.5, 240.5]);
@@ -134,7 +134,7 @@ fn fisheye_lenses_are_read() {
         ros.distortion.fisheye,
         Some([-0.41527, 0.31874, -0.00197, 0.00071])
     );
-    // Five coefficients are another lens'.
+    // Five coefficients belong to another lens model.
     let refusal = parse(&ROS.replace("plumb_bob", "fisheye")).unwrap_err();
     assert!(refusal.to_string().contains("5 coefficients"), "{refusal}");
 }

@@ -13,19 +13,19 @@ use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// Frames read and written together.
+/// Number of frames read and written together.
 const BATCH: usize = 8;
 
-/// Writes a data set as a ROS 1 bag, and beside it the file that says where its sensors are and whether it is simulated: PNG images,
-/// CameraInfo, speed and yaw rate (TwistStamped) and, where there is depth, point clouds in the camera's place. Times are the vehicle's
-/// clock's, for all sensors.
+/// Writes a data set as a ROS 1 bag: PNG images, CameraInfo, speed and yaw rate (TwistStamped) and, if the data set has depth, point
+/// clouds at the camera's position. A file beside the bag has the sensors' mounts, and whether the recording is simulated. The times of all
+/// sensors are on the vehicle's clock.
 ///
-/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done: after an
-/// error, or stopped, neither file is there.
+/// `progress` is called with the number of frames done and the total. [`ControlFlow::Break`] stops the conversion, unless all frames are
+/// done. After an error or a stop, neither file exists.
 ///
 /// # Errors
-/// [`Error::Exists`] where `out` is there already; [`Error::NoTimes`] where a frame has no time; [`Error::Stopped`];
-/// [`Error::Bag`], and what reading can have wrong.
+/// [`Error::Exists`] if `out` exists; [`Error::NoTimes`] if a frame has no time; [`Error::Stopped`];
+/// [`Error::Bag`]; and the errors of reading the data set.
 pub fn convert_to_bag(
     dataset: &Dataset,
     out: &Path,
@@ -41,7 +41,7 @@ pub fn convert_to_bag(
         }
     }
     let moved_s = seconds_to_move(std::slice::from_ref(dataset));
-    // No time is below 0 once it is moved.
+    // Shifted times are never below 0.
     let time = |time_s: f64| Time::from_nanos(at_ns(dataset, time_s, moved_s).max(0) as u64);
     let mut times = Vec::with_capacity(dataset.frames().len());
     for frame in dataset.frames() {
@@ -100,7 +100,7 @@ pub fn convert_to_bag(
     }
     super::parts::write_text(&sidecar, &describe(dataset))?;
     if let Err(error) = bag.finish() {
-        // Best effort: without its bag it would be in the way of the next try. With the bag in place, only the wait for the disk has failed.
+        // Best effort: without its bag, the file would block the next attempt. If the bag exists, only syncing has failed.
         if !out.exists() {
             let _ = std::fs::remove_file(&sidecar);
         }
@@ -112,7 +112,7 @@ pub fn convert_to_bag(
     })
 }
 
-/// Writes how the vehicle moves at each time of its track; `time` is the bag's of a time of the recording.
+/// Writes speed and yaw rate at each time of the vehicle's track; `time` converts a time of the recording to one of the bag.
 fn write_speeds(
     dataset: &Dataset,
     bag: &mut BagWriter,
@@ -141,7 +141,7 @@ fn write_speeds(
     Ok(())
 }
 
-/// Points as a message; `out` is named in errors.
+/// A point cloud message; `out` is the path named in errors.
 fn cloud(header: Header, points: &[[f32; 3]], out: &Path) -> Result<PointCloud2<'static>> {
     let column = |axis: usize| -> Vec<f32> { points.iter().map(|p| p[axis]).collect() };
     let (x, y, z) = (column(0), column(1), column(2));
@@ -153,7 +153,7 @@ fn cloud(header: Header, points: &[[f32; 3]], out: &Path) -> Result<PointCloud2<
     })
 }
 
-/// A frame, read.
+/// A frame's contents.
 struct Picture {
     png: Vec<u8>,
     points: Option<Vec<[f32; 3]>>,
@@ -202,7 +202,7 @@ fn describe(dataset: &Dataset) -> String {
         let _ = writeln!(text, "\n[{name}]\ntranslation = {t}\nrotation = {r}");
     };
     add("cam_from_lidar", &Se3::cam_from_body_axes());
-    // A guess is left out: the bag's reader makes the same one, and says so.
+    // An assumed mount is left out: the bag's reader assumes the same, with a warning.
     if let Some(pose) = dataset
         .cam_from_vehicle()
         .filter(|_| !dataset.mount_assumed())

@@ -1,19 +1,19 @@
-//! Dates of the Gregorian calendar from nanoseconds since 1970, UTC.
+//! Dates in UTC from nanoseconds since 1970.
 
 use jiff::Timestamp;
 
-/// `2011_09_26`, as KITTI names the folder of a day.
+/// A date like `2011_09_26`, KITTI's name for the folder of a day.
 pub(super) fn date(ns: i64) -> String {
     timestamp(ns).strftime("%Y_%m_%d").to_string()
 }
 
-/// `2011-09-26 13:02:25.964389445`, as KITTI writes times.
+/// A time like `2011-09-26 13:02:25.964389445`, as KITTI writes it.
 pub(super) fn stamp(ns: i64) -> String {
     timestamp(ns).strftime("%Y-%m-%d %H:%M:%S%.9f").to_string()
 }
 
 fn timestamp(ns: i64) -> Timestamp {
-    // Nanoseconds in 64 bits are of the years 1677 to 2262, which the calendar has.
+    // 64 bits of nanoseconds reach from 1677 to 2262, within the calendar's range.
     Timestamp::from_nanosecond(ns.into()).unwrap_or_default()
 }
 

@@ -1,4 +1,4 @@
-//! Ground truth of many frames in one `.npz`.
+//! Writes the ground truth of many frames into one `.npz`.
 
 use super::ground_truth_names;
 use crate::{ArrayProblem, Dataset, Error, GtKind, Result};
@@ -7,22 +7,22 @@ use ndarray_npy::{NpzWriter, WriteNpyError, WriteNpzError};
 use std::collections::HashSet;
 use std::path::Path;
 
-/// Before a frame's name: its velocities in the file that [`export_gt`] writes.
+/// Prefix of a frame's name for the array of its velocities in the file that [`export_gt`] writes.
 pub const VELOCITY: &str = "velocity_mps/";
 
-/// Writes the sparse depth of every selected frame that has a scan as H×W f32 arrays, metres, 0 =
-/// none, into a compressed `.npz`; returns how many. `progress` is called with (done, all) after each frame.
+/// Writes the sparse depth of every selected frame that has a scan into a compressed `.npz`, as H×W f32 arrays in metres, 0 = no
+/// depth; returns their number. `progress` is called with (done, total) after each frame.
 ///
-/// They are in the order of the split's lines ([`Dataset::split_places`]), so that predictions without names, which are in that order, meet
-/// theirs; what has no place there comes last, in the order of the data sets. Names are [`ground_truth_names`]'; a frame given twice is
-/// written once.
+/// The arrays are in the order of the split's lines ([`Dataset::split_places`]), so that predictions without names, which are in that
+/// order, match them. Frames without a place in the split come last, in the order of the data sets. Names are those of
+/// [`ground_truth_names`]. A frame given twice is written once.
 ///
-/// A frame whose scan has radial velocities has a second array of that size, named with [`VELOCITY`] before its name:
-/// [`crate::ScanTruth::velocity_mps`].
+/// A frame whose scan has radial velocities gets a second array of that size, [`crate::ScanTruth::velocity_mps`], whose name is the
+/// frame's with the prefix [`VELOCITY`].
 ///
 /// # Errors
-/// [`Error::NoScans`] if no frame has one, [`Error::Array`] or [`Error::File`] if writing fails, and
-/// as [`Dataset::ground_truth`]. Nothing is left at `out` then.
+/// [`Error::NoScans`] if no frame has a scan, [`Error::Array`] or [`Error::File`] if writing fails, and
+/// those of [`Dataset::ground_truth`]. After an error, `out` does not exist.
 pub fn export_gt(
     datasets: &[Dataset],
     kind: GtKind,
@@ -69,16 +69,16 @@ pub fn export_gt(
     Ok(written)
 }
 
-/// A selected frame, and what its array is called.
+/// A selected frame, and the name of its array.
 struct NamedFrame<'a> {
     dataset: &'a Dataset,
     index: usize,
     name: &'a str,
-    /// In the split.
+    /// Its place in the split.
     place: Option<usize>,
 }
 
-/// The selected frames, each once, in the order of the split.
+/// The selected frames in the order of the split, without duplicates.
 fn in_split_order<'a>(datasets: &'a [Dataset], names: &'a [Vec<String>]) -> Vec<NamedFrame<'a>> {
     let mut frames = Vec::new();
     for (dataset, names) in datasets.iter().zip(names) {
@@ -100,7 +100,7 @@ fn in_split_order<'a>(datasets: &'a [Dataset], names: &'a [Vec<String>]) -> Vec<
     frames
 }
 
-/// The system's error inside the array writer's, so that a full disk is reported as such.
+/// Extracts the system's error from the array writer's, so that a full disk is reported as such.
 fn write_error(out: &Path, error: WriteNpzError) -> Error {
     match error {
         WriteNpzError::Npy(WriteNpyError::Io(source)) => Error::file(out, source),

@@ -13,21 +13,24 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// Writes data sets as drives of a KITTI date folder below `out`, which must be new or empty, and returns the drives'
-/// folders. All must have one camera: KITTI's calibration is that of a date. Times are the vehicle's clock's, for all
-/// sensors.
+/// folders. All must have the same camera, because KITTI has one calibration per date. The times of all sensors are on the
+/// vehicle's clock.
 ///
-/// `velodyne_points` holds the measured depth as points in the camera's place (what stands still is where it was at the
-/// frame's time), not the scanner's own. `oxts` holds speed, turn, roll and pitch, and zeros for what the recording does not
-/// know: a packet a frame, or where frames are more than half a second apart, packets at the times of the recording's speeds. The drive's `dataset.toml`, which goes with it wherever it is moved, says so where yaw, roll and pitch, or the camera's place are not known, and where it
-/// is [simulated](Dataset::is_simulated). A frame without a time has an empty line, as in KITTI's own files.
+/// - `velodyne_points` has the measured depth as points relative to the camera's position, not the scanner's; static
+///   points are where they were at the frame's time.
+/// - `oxts` has speed, yaw rate, roll and pitch, and zeros for what the recording does not contain: one packet per frame, or, if
+///   frames are more than half a second apart, packets at the times of the recording's speeds.
+/// - The drive's `dataset.toml`, inside its folder, states if yaw, tilt or the camera's mount are unknown, and whether the recording
+///   is [simulated](Dataset::is_simulated).
+/// - A frame without a time has an empty line in `timestamps.txt`, as in KITTI's own files.
 ///
-/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done. Everything
-/// is written to a folder beside its final place and renamed at the end: after an error, or stopped, `out` is as it was. What a conversion
-/// that was killed left there is removed, and is not in the way.
+/// `progress` is called with the number of frames done and the total. [`ControlFlow::Break`] stops the conversion, unless all frames are
+/// done. Everything is written to a temporary folder beside the final one and renamed at the end, so after an error or a stop `out` is
+/// unchanged. The remains of a killed conversion are removed.
 ///
 /// # Errors
-/// [`Error::Exists`] if `out` holds anything, [`Error::Unfinished`] if that is what another writes, or left and cannot be removed;
-/// [`Error::Cameras`] where the cameras differ; [`Error::Stopped`]; and what reading or writing can have wrong.
+/// [`Error::Exists`] if `out` is not empty, [`Error::Unfinished`] if another process is writing there, or its remains cannot be removed;
+/// [`Error::Cameras`] if the cameras differ; [`Error::Stopped`]; and the errors of reading and writing.
 pub fn convert_to_kitti(
     datasets: &[Dataset],
     out: &Path,
@@ -54,7 +57,7 @@ pub fn convert_to_kitti(
     let partial = PartialFolder::beside(&date_folder).map_err(|e| Error::file(out, e))?;
     let names = write_date(datasets, partial.path(), &date_name, moved_s, progress)
         .map_err(|error| error.moved(partial.path(), &date_folder))?;
-    // Waits for the disk once: a wait for each of its thousands of files would take longer than writing them.
+    // Syncs once: syncing each of the thousands of files would take longer than writing them.
     let committed = partial.commit();
     committed.map_err(|e| Error::file(&date_folder, e))?;
     Ok(Converted {
@@ -63,7 +66,7 @@ pub fn convert_to_kitti(
     })
 }
 
-/// Writes all drives of a date and its calibration into a folder; gives the drives' names.
+/// Writes all drives of a date and its calibration into a folder, and returns the drives' names.
 fn write_date(
     datasets: &[Dataset],
     folder: &Path,
@@ -89,7 +92,8 @@ fn write_date(
     Ok(names)
 }
 
-/// Says of a drive what KITTI's own files cannot: that nobody drove it, what of its oxts nobody measured, and that the camera's place is a guess.
+/// Writes what KITTI's own files cannot express about a drive: that it is simulated, which of its oxts values were not measured, and that
+/// the camera's mount is assumed.
 fn write_notes(dataset: &Dataset, folder: &Path) -> Result<()> {
     let moves = dataset.track().is_some();
     let notes = [
@@ -108,13 +112,13 @@ fn write_notes(dataset: &Dataset, folder: &Path) -> Result<()> {
     super::parts::write_text(&folder.join(FolderConfig::NAME), &text)
 }
 
-/// Zeros stand in the packets.
+/// The packets have zeros instead.
 const YAW_UNKNOWN: &str = "yaw_known = false\n";
 const TILT_UNKNOWN: &str = "tilt_known = false\n";
-/// The calibration has the place that was assumed.
+/// The calibration file has the assumed mount.
 const MOUNT_UNKNOWN: &str = "mount_known = false\n";
 
-/// Frames read and written together.
+/// Number of frames read and written together.
 const BATCH: usize = 8;
 
 fn write_drive(
@@ -178,7 +182,7 @@ fn write_drive(
     Ok(())
 }
 
-/// Whether frames that follow one another are farther apart in time than a reader of packets bridges.
+/// Whether consecutive frames are farther apart in time than a reader of packets bridges.
 fn is_too_slow(dataset: &Dataset) -> bool {
     let frames = dataset.frames().windows(2);
     let mut apart_s = frames.filter_map(|pair| {
@@ -187,8 +191,8 @@ fn is_too_slow(dataset: &Dataset) -> bool {
     apart_s.any(|apart_s| apart_s > VehicleTrack::MAX_GAP_S)
 }
 
-/// Packets at the times of the recording's own speeds, with numbers of their own: at a slow camera's frames alone nobody could tell how the
-/// vehicle moved from one to the next. KITTI's `sync` drives have a packet a frame, its raw ones have packets as these.
+/// Writes packets at the times of the recording's own speeds, with their own numbers: packets only at a slow camera's frames would not show
+/// how the vehicle moved between them. KITTI's `sync` drives have one packet per frame, its unsynced ones have packets like these.
 fn write_own_packets(dataset: &Dataset, data: &Path, moved_s: i64) -> Result<()> {
     let times = dataset.track().map(MotionModel::times_s);
     let mut lines = String::new();
@@ -203,16 +207,16 @@ fn write_own_packets(dataset: &Dataset, data: &Path, moved_s: i64) -> Result<()>
     super::parts::write_text(&folder.join("timestamps.txt"), &lines)
 }
 
-/// The numbers by which a drive's files are named.
+/// The numbers in the names of a drive's files.
 struct Numbers {
     of_frames: Vec<u64>,
-    /// Whether they are the recording's.
+    /// Whether they are the recording's own numbers.
     own: bool,
 }
 
 impl Numbers {
-    /// The recording's own. KITTI has a line of times for every number, so where these are dates, or leave out millions, the frames are
-    /// counted from 0 instead, one number left out between frames that were no neighbours.
+    /// The recording's own numbers. KITTI has a line of times for every number, so if they are dates, or leave out millions, the frames are
+    /// counted from 0 instead, with one number left out between frames that were not neighbours.
     fn of(dataset: &Dataset) -> Self {
         let own: Vec<u64> = dataset.frames().iter().map(|f| f.number).collect();
         let most = 1_000_000 + 100 * own.len() as u64;
@@ -234,7 +238,7 @@ impl Numbers {
         }
     }
 
-    /// A line for every number, as KITTI has it: numbers without a frame get the time between their neighbours', a frame without a time
+    /// One line for every number, as in KITTI. A number without a frame gets a time between its neighbours', and a frame without a time
     /// an empty line.
     fn times(&self, dataset: &Dataset, moved_s: i64) -> String {
         let last = self.of_frames.last().copied().unwrap_or_default();
@@ -257,7 +261,7 @@ impl Numbers {
         text
     }
 
-    /// The time of a number that has no frame, `after` the first with one behind it: straight between its neighbours'.
+    /// The time of a number without a frame, interpolated linearly; `after` is the next one with a frame.
     fn between(&self, dataset: &Dataset, number: u64, after: usize) -> Option<f64> {
         let before = after.checked_sub(1)?;
         let [from, to] = [before, after].map(|frame| {
@@ -272,7 +276,7 @@ impl Numbers {
     }
 }
 
-/// An OXTS packet that knows speed, turn, roll and pitch alone; at rest an accelerometer reads 9.81 upwards.
+/// An OXTS packet with only speed, rates, roll and pitch; an accelerometer at rest reads 9.81 m/s² upwards.
 fn packet(moving: &Moving) -> String {
     let mut values = [0.0; 30];
     values[3..5].copy_from_slice(&moving.tilt_rad);

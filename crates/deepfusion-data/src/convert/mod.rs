@@ -1,8 +1,8 @@
-//! A recording of any layout written as another: KITTI raw, or a ROS 1 bag.
+//! Converts a recording of any layout to KITTI raw or a ROS 1 bag.
 //!
-//! What is written is what a [`Dataset`](crate::Dataset) gives: images freed of their lens' distortion, their times, the
-//! camera, its place on the vehicle, speeds, turns, roll and pitch, and the measured depth as points in the camera's place. The
-//! other layout then gives the same snippets and the same ground truth. The measured depth alone is written as arrays, or drawn on the images.
+//! The contents of a [`Dataset`](crate::Dataset) are written: images corrected for lens distortion, their times, the
+//! camera, its mount on the vehicle, speeds, yaw rates, roll and pitch, and the measured depth as points relative to the camera. The
+//! converted recording gives the same snippets and ground truth. The measured depth can also be written as arrays, or drawn on the images.
 
 mod bag;
 mod calendar;

@@ -1,16 +1,16 @@
-//! What frames are called in array files and as pictures.
+//! Names of frames in array files and as pictures.
 
 use crate::Dataset;
 use std::collections::{BTreeMap, HashSet};
 use std::fs;
 use std::path::PathBuf;
 
-/// The names under which the selected frames of `datasets` appear in array files, a list for each data
-/// set: `0000000005`, or `<drive>/0000000005` where there are several drives, with the camera's folder
-/// between where there are both cameras.
+/// The names of the selected frames of `datasets` in array files, one list per data set: `0000000005`, or
+/// `<drive>/0000000005` if there are several drives, with the camera's folder in between if there are both
+/// cameras.
 ///
-/// Of drives of one name the later ones have a number, in the order of their paths: `<drive>-2/0000000005`. A drive that is given twice
-/// has the same names twice.
+/// If several drives have the same name, the second and later ones get a number, in the order of their paths:
+/// `<drive>-2/0000000005`. A drive that is given twice has the same names twice.
 #[must_use]
 pub fn ground_truth_names(datasets: &[Dataset]) -> Vec<Vec<String>> {
     let drives = drive_names(datasets);
@@ -29,10 +29,10 @@ pub fn ground_truth_names(datasets: &[Dataset]) -> Vec<Vec<String>> {
     names.collect()
 }
 
-/// What tells drives apart. The two cameras of one are the same.
+/// Identifies a drive. Its two cameras belong to the same drive.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 struct Drive<'a> {
-    /// Its folder, or the file that its images are in.
+    /// Its folder, or the file that contains its images.
     path: PathBuf,
     split_name: &'a str,
 }
@@ -47,7 +47,7 @@ impl<'a> Drive<'a> {
     }
 }
 
-/// The drives' names, of which no two are the same, not even to a file system for which `A` is `a`.
+/// Unique names of the drives, also on file systems that ignore case.
 fn drive_names(datasets: &[Dataset]) -> BTreeMap<Drive<'_>, String> {
     let drives = datasets.iter().map(|d| (Drive::of(d), d.name()));
     let drives: BTreeMap<_, _> = drives.collect();
@@ -58,7 +58,7 @@ fn drive_names(datasets: &[Dataset]) -> BTreeMap<Drive<'_>, String> {
         .collect()
 }
 
-/// This name, with a number where it is among those taken, in small letters: `a`, `a-2`.
+/// This name, with a number appended if its lower-case form is already taken: `a`, `a-2`.
 fn unique(name: &str, taken: &mut HashSet<String>) -> String {
     let mut candidate = name.to_owned();
     let mut number = 1;

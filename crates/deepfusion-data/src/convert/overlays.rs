@@ -1,4 +1,4 @@
-//! A recording's measured depth drawn on its images, a picture each.
+//! Pictures of a recording's measured depth drawn on its images.
 
 use std::fs::create_dir_all;
 use std::path::{Path, PathBuf};
@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use super::ground_truth_names;
 use crate::{Dataset, Error, GtKind, OpenOptions, Result, overlay, save_png};
 
-/// Writes a picture ([`overlay`]) of every frame of a recording that has a scan into a folder, by the names of [`ground_truth_names`]; returns
-/// how many. `progress` is called with (done, all) after each frame.
+/// Writes a picture ([`overlay`]) of every frame of a recording that has a scan into a folder, named by [`ground_truth_names`]; returns
+/// their number. `progress` is called with (done, total) after each frame.
 ///
 /// # Errors
-/// [`Error::NoScans`] if no frame has one, [`Error::File`] if writing fails, and as [`Dataset::open`], [`Dataset::load_image`] and
+/// [`Error::NoScans`] if no frame has a scan, [`Error::File`] if writing fails, and those of [`Dataset::open`], [`Dataset::load_image`] and
 /// [`Dataset::ground_truth`].
 pub fn write_overlays(
     path: &Path,
@@ -42,7 +42,7 @@ pub fn write_overlays(
     Ok(written)
 }
 
-/// `<folder>/<name>.png`, where the name may hold the drive's folder.
+/// `<folder>/<name>.png`, where the name may contain the drive's folder.
 fn picture_path(folder: &Path, name: &str) -> Result<PathBuf> {
     let path = folder.join(format!("{name}.png"));
     if let Some(parent) = path.parent() {

@@ -1,4 +1,4 @@
-//! What both layouts are written from: points, times, how the vehicle moves.
+//! What both converters write: points, times, the vehicle's motion.
 
 use crate::{Dataset, Error, GtKind, MotionModel, Result};
 use deepfusion_fs::InTheWay;
@@ -7,8 +7,8 @@ use std::io::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// A frame's measured depth as points of a scanner at the camera's place, x forward, y left, z up, in metres: each
-/// projects back to the pixel it came from. `None` where the frame has no depth.
+/// A frame's measured depth as points of a scanner at the camera's position (x forward, y left, z up, metres). Each
+/// projects back to the pixel it came from. `None` if the frame has no depth.
 pub(super) fn points(dataset: &Dataset, frame: usize) -> Result<Option<Vec<[f32; 3]>>> {
     let Some(depth) = dataset.ground_truth(frame, GtKind::Z)? else {
         return Ok(None);
@@ -25,9 +25,9 @@ pub(super) fn points(dataset: &Dataset, frame: usize) -> Result<Option<Vec<[f32;
     Ok(Some(points))
 }
 
-/// Whole seconds by which all times of the recordings have to be moved, so that all are after the beginning of 1970: 0 where
-/// they are. Neither layout can write an earlier one, in a bag 0 means that no time is set, and a clock that counts from its own
-/// start has such times where one sensor started first.
+/// Whole seconds by which all times of the recordings must be shifted to be after the beginning of 1970; 0 if they
+/// already are. Neither layout can represent earlier times, and in a bag 0 means that no time is set. Such times occur if a clock counts
+/// from its own start and a sensor started before it.
 pub(super) fn seconds_to_move(datasets: &[Dataset]) -> i64 {
     let earliest = |dataset: &Dataset| {
         let frames = dataset.frames().iter().filter_map(|f| f.time_s);
@@ -39,11 +39,11 @@ pub(super) fn seconds_to_move(datasets: &[Dataset]) -> i64 {
         Some(at_ns(dataset, first_s, 0))
     };
     let earliest = datasets.iter().filter_map(earliest).min().unwrap_or(1);
-    // Down to whole seconds: 0 for 1 ns and later, −1 for 0 and for a second before it.
+    // Rounded down to whole seconds: 0 for 1 ns and later, −1 for 0 ns and the second before it.
     (earliest - 1).min(0).div_euclid(NANOS).abs()
 }
 
-/// A time of a recording as nanoseconds since 1970, moved by whole seconds.
+/// A time of a recording as nanoseconds since 1970, shifted by whole seconds.
 pub(super) fn at_ns(dataset: &Dataset, time_s: f64, moved_s: i64) -> i64 {
     let origin_ns = dataset.origin_ns().unwrap_or_default();
     let ns = origin_ns.saturating_add((time_s * 1e9).round() as i64);
@@ -52,20 +52,20 @@ pub(super) fn at_ns(dataset: &Dataset, time_s: f64, moved_s: i64) -> i64 {
 
 const NANOS: i64 = 1_000_000_000;
 
-/// What came of a conversion.
+/// Result of a conversion.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Converted {
-    /// What was written: drives' folders, or a bag.
+    /// Paths of what was written: the drives' folders, or the bag.
     pub paths: Vec<PathBuf>,
-    /// Seconds by which every time was moved, as some were not after the beginning of 1970, and neither layout can write
-    /// those; 0 in general.
+    /// Seconds by which every time was shifted because some were not after the beginning of 1970, which neither layout can
+    /// represent; usually 0.
     pub moved_s: i64,
 }
 
-/// The line of the file beside a recording that says that nobody drove it.
+/// The line in the file beside a recording that marks it as simulated.
 pub(super) const SIMULATED: &str = "simulated = true\n";
 
-/// Refuses an output folder that holds something; there may be none.
+/// Refuses an output folder that is not empty; it need not exist.
 pub(super) fn require_empty(out: &Path) -> Result<()> {
     let found = deepfusion_fs::in_the_way(out);
     match found.map_err(|e| Error::file(out, e))? {
@@ -77,7 +77,7 @@ pub(super) fn require_empty(out: &Path) -> Result<()> {
     }
 }
 
-/// Ends a conversion whose listener asks for it, where frames are left.
+/// Stops a conversion if the progress callback requests it and frames are left.
 pub(super) fn go_on(asked: ControlFlow<()>, done: usize, total: usize) -> Result<()> {
     if asked.is_break() && done < total {
         Err(Error::Stopped { done, total })
@@ -93,20 +93,20 @@ pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     })
 }
 
-/// Half the time over which a rate is taken, in seconds.
+/// Half the time span over which a rate is computed, in seconds.
 const RATE_REACH_S: f64 = 0.05;
 
-/// How a vehicle moves at a time.
+/// A vehicle's motion at one time.
 pub(super) struct Moving {
-    /// Forward, in m/s.
+    /// Forward speed, in m/s.
     pub(super) speed_mps: f64,
-    /// About x, y and z, in rad/s.
+    /// Rates of turn about x, y and z, in rad/s.
     pub(super) rates_radps: [f64; 3],
-    /// Roll and pitch, in radians; 0 where nothing measured them.
+    /// Roll and pitch, in radians; 0 if they were not measured.
     pub(super) tilt_rad: [f64; 2],
 }
 
-/// What the recording says about a time; `None` where it does not.
+/// The recorded motion at a time; `None` if there is none.
 pub(super) fn moving_at(dataset: &Dataset, time_s: f64) -> Option<Moving> {
     let track = dataset.track()?;
     let speed = track.speed_at(time_s)?;

@@ -1,9 +1,9 @@
-//! Which of a car's cameras.
+//! Selects one of a vehicle's cameras.
 
 use deepfusion_hint::Hint;
 use serde::{Deserialize, Serialize};
 
-/// One of the car's two colour cameras. The only camera of a recording counts as the left one.
+/// One of the vehicle's two colour cameras. A recording's only camera counts as the left one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Camera {
@@ -14,7 +14,7 @@ pub enum Camera {
 }
 
 impl Camera {
-    /// KITTI's number: 2 or 3.
+    /// The camera's number in KITTI: 2 or 3.
     #[must_use]
     pub fn number(self) -> u8 {
         match self {
@@ -34,13 +34,13 @@ pub enum Cameras {
     /// Camera 3, the right one.
     #[serde(rename = "3")]
     Right,
-    /// Both, a data set each.
+    /// Both, each as a data set.
     #[serde(rename = "both")]
     Both,
 }
 
 impl Cameras {
-    /// The cameras chosen.
+    /// The selected cameras.
     #[must_use]
     pub fn cameras(self) -> &'static [Camera] {
         match self {
@@ -51,17 +51,17 @@ impl Cameras {
     }
 }
 
-/// A text that names no camera.
+/// The error for a text that does not name a camera.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-#[error("'{text}' is no camera: 2, 3 or both")]
+#[error("unknown camera '{text}', expected 2, 3 or both")]
 pub struct NoSuchCamera {
     /// The text.
     pub text: String,
 }
 
 impl Hint for NoSuchCamera {
-    /// The message itself lists what can be chosen.
+    /// No hint: the message already lists the choices.
     fn hint(&self) -> Option<String> {
         None
     }

@@ -1,23 +1,23 @@
-//! How much of a split a set of recordings holds, and where.
+//! How much of a split a set of recordings contains, and where.
 
 use super::drive::Dataset;
 use super::split::Split;
 use std::collections::{HashMap, HashSet};
 
-/// How much of a split's list a set of recordings holds.
+/// How much of a split's list a set of recordings contains.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SplitCoverage {
-    /// Frames of the list, each once. A line that names a kind of drive counts as the frames of such drives that are
-    /// there: nobody says how many there should be.
+    /// Number of distinct frames in the list. A line with a scenario counts as the frames found in drives of that
+    /// scenario, since their true number is unknown.
     pub expected: usize,
-    /// How many of them the recordings hold.
+    /// How many of them the recordings contain.
     pub found: usize,
-    /// The first line of which nothing is there.
+    /// The first line without any frame in the recordings.
     pub first_missing: Option<String>,
 }
 
 impl SplitCoverage {
-    /// Whether everything that the list names is there.
+    /// Whether the recordings contain everything in the list.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.first_missing.is_none()
@@ -25,7 +25,7 @@ impl SplitCoverage {
 }
 
 impl Split {
-    /// How many of the split's frames are in `datasets`, which were opened with it.
+    /// How many of the split's frames are in `datasets`, which must have been opened with this split.
     #[must_use]
     pub fn coverage(&self, datasets: &[Dataset]) -> SplitCoverage {
         let mut here = HashSet::new();
@@ -63,8 +63,8 @@ impl Split {
         }
     }
 
-    /// Where the split's frames are, in the split's order: index into `datasets` and index of the frame
-    /// in it; then those of its scenarios. Frames that are not there are left out.
+    /// Positions of the split's frames, in the split's order, then those of its scenarios: index into `datasets`
+    /// and index of the frame in that data set. Missing frames are left out.
     #[must_use]
     pub fn locate(&self, datasets: &[Dataset]) -> Vec<(usize, usize)> {
         let mut places = HashMap::new();

@@ -22,19 +22,19 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Everything a trainer or an evaluator needs from one camera's recording of one drive.
+/// One camera's recording of one drive, with everything that training and evaluation need.
 #[derive(Debug, Clone)]
 pub struct Dataset {
     parts: DatasetParts,
     selected: Vec<usize>,
-    /// Of each of these its place in the split.
+    /// Place in the split of each frame in `selected`.
     split_places: Vec<Option<usize>>,
     recording: Arc<dyn Recording>,
     receiver: Receiver,
     camera_assumed: bool,
     mount_assumed: bool,
     simulated: bool,
-    /// The recording's, and what was noticed about its neighbours.
+    /// The recording's warnings, and those about recordings beside it.
     warnings: Vec<DataWarning>,
 }
 
@@ -56,40 +56,40 @@ impl Dataset {
         }
     }
 
-    /// With the mark of a simulator, or without it.
+    /// The same data set, marked as simulated or not.
     #[must_use]
     pub fn with_simulated(mut self, simulated: bool) -> Self {
         self.simulated = simulated;
         self
     }
 
-    /// Whether the recording says that nobody drove it: by the key `simulated` of the file beside it, else by what only a simulator can write
-    /// beside the images. [`crate::convert_to_kitti`] and [`crate::convert_to_bag`] hand it on. Without the mark it may be either.
+    /// Whether the recording is marked as simulated: by the key `simulated` of the file beside it, or by data that only a simulator can
+    /// provide. [`crate::convert_to_kitti`] and [`crate::convert_to_bag`] keep the mark. An unmarked recording may be real or simulated.
     #[must_use]
     pub fn is_simulated(&self) -> bool {
         self.simulated
     }
 
-    /// With a camera that nothing says, or that something does.
+    /// The same data set, with its camera marked as assumed or not.
     #[must_use]
     pub fn with_camera_assumed(mut self, assumed: bool) -> Self {
         self.camera_assumed = assumed;
         self
     }
 
-    /// Whether nothing says what the camera is, and [`OpenOptions::assumed_camera`] stands in.
+    /// Whether there is no calibration, so that [`OpenOptions::assumed_camera`] is used.
     #[must_use]
     pub fn camera_assumed(&self) -> bool {
         self.camera_assumed
     }
 
-    /// With only these frames selected, by index, each with its place in the split.
+    /// The same data set with only these frames selected, by index, each with its place in the split.
     pub(crate) fn with_selected(mut self, selected: Vec<(usize, Option<usize>)>) -> Self {
         (self.selected, self.split_places) = selected.into_iter().unzip();
         self
     }
 
-    /// The same drive with some of its frames alone, by index, all of them selected.
+    /// The same drive with only a range of its frames, by index, all selected.
     ///
     /// # Panics
     /// If the range ends beyond the frames.
@@ -102,10 +102,10 @@ impl Dataset {
         part
     }
 
-    /// With what the options select; for layouts of one drive and one camera.
+    /// Applies the selection in the options, for layouts with one drive and one camera.
     ///
     /// # Errors
-    /// [`Error::SplitSelectsNothing`]; [`Error::OneCamera`] where only the right camera is asked for.
+    /// [`Error::SplitSelectsNothing`]; [`Error::OneCamera`] if only the right camera is requested.
     pub(crate) fn select(self, path: &Path, options: &OpenOptions) -> Result<Self> {
         if !options.camera.cameras().contains(&self.camera()) {
             return Err(Error::OneCamera {
@@ -127,33 +127,33 @@ impl Dataset {
         &self.parts.name
     }
 
-    /// Its name in split files: KITTI raw's is `<date>/<drive>`, others' the folder's name; a number has no leading zeros, as in
-    /// the odometry task's lists.
+    /// The drive's name in split files: `<date>/<drive>` for KITTI raw, otherwise the folder's name; a number has no leading zeros, as in
+    /// the lists for KITTI odometry.
     #[must_use]
     pub fn split_name(&self) -> &str {
         &self.parts.split_name
     }
 
-    /// The layout it came in.
+    /// The layout of the recording.
     #[must_use]
     pub fn kind(&self) -> DatasetKind {
         self.recording.kind()
     }
 
-    /// The camera whose images these are.
+    /// The camera that took the images.
     #[must_use]
     pub fn camera(&self) -> Camera {
         self.parts.camera
     }
 
-    /// The folder its files are in.
+    /// Folder of the recording's files.
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.recording.folder()
     }
 
-    /// The file that all its images are in, as a video's or a bag's are; else [its folder](Self::folder). Recordings side by side share a folder,
-    /// and their files may differ in the endings of their names alone.
+    /// The file with all images (a video or a bag), otherwise [the folder](Self::folder). Recordings in the same folder may have file names
+    /// that differ only in their extension.
     #[must_use]
     pub fn place(&self) -> &Path {
         match self.frames().first().map(|frame| &frame.image) {
@@ -162,67 +162,67 @@ impl Dataset {
         }
     }
 
-    /// The kind of drive, such as `garage`, where the recording says it.
+    /// The kind of drive, such as `garage`, if the recording states it.
     #[must_use]
     pub fn scenario(&self) -> Option<&str> {
         self.parts.scenario.as_deref()
     }
 
-    /// All frames, by number. Not all need be selected.
+    /// All frames, ordered by number, selected or not.
     #[must_use]
     pub fn frames(&self) -> &[Frame] {
         &self.parts.frames
     }
 
-    /// Indices of the frames that the split selects, all without one. Never empty.
+    /// Indices of the frames that the split selects; all frames without a split. Never empty.
     #[must_use]
     pub fn selected(&self) -> &[usize] {
         &self.selected
     }
 
-    /// Of each [selected](Self::selected) frame its place among the lines of the split that name frames, from 0; `None` without a split,
-    /// and for what a scenario selects. Recordings are opened in an order of their own, with their frames by number: the lists of the field
-    /// often have another, and what comes without names is in theirs.
+    /// For each [selected](Self::selected) frame, its place among the split's lines that name frames, from 0; `None` without a split,
+    /// and for frames selected by a scenario. Data sets have their frames ordered by number, whereas published splits often have another
+    /// order, which arrays without names follow.
     #[must_use]
     pub fn split_places(&self) -> &[Option<usize>] {
         &self.split_places
     }
 
-    /// A point of the vehicle (x forward, y left, z up) in the camera, in metres; `None` where unknown.
+    /// Transforms points from the vehicle (x forward, y left, z up) to the camera, in metres; `None` if unknown.
     #[must_use]
     pub fn cam_from_vehicle(&self) -> Option<Se3> {
         self.parts.cam_from_vehicle
     }
 
-    /// The car's speed and yaw rate, where the drive has them. See [`Self::yaw_known`].
+    /// The vehicle's speed and yaw rate, if the drive has them. See [`Self::yaw_known`].
     #[must_use]
     pub fn track(&self) -> Option<&MotionModel> {
         self.parts.track.as_ref()
     }
 
-    /// Whether the track knows how the vehicle turned: measured, or [taken](Self::take_turns) from the images. Where not, only its speeds
-    /// and distances mean anything.
+    /// Whether the track's turns are known: measured, or [estimated](Self::take_turns) from the images. If not, only its speeds
+    /// and distances are valid.
     #[must_use]
     pub fn yaw_known(&self) -> bool {
         self.parts.yaw_known
     }
 
-    /// Nanoseconds from which its seconds are counted (since 1970 where the recording's clock says so), on the
-    /// vehicle's clock, where it has time stamps.
+    /// Origin of the drive's times on the vehicle's clock, in nanoseconds (since 1970 if that clock counts from then); `None` without
+    /// time stamps.
     #[must_use]
     pub fn origin_ns(&self) -> Option<i64> {
         self.parts.origin_ns
     }
 
-    /// How far the camera's clock was said to be ahead of the vehicle's, in seconds: by the recording's file or by
-    /// [`OpenOptions::camera_ahead_s`]. It is off the frames' times already.
+    /// How far the camera's clock is ahead of the vehicle's, in seconds, according to the recording's file or
+    /// [`OpenOptions::camera_ahead_s`]. Already subtracted from the frames' times.
     #[must_use]
     pub fn camera_ahead_s(&self) -> f64 {
         self.parts.camera_ahead_s
     }
 
-    /// The time of a frame number, whether or not there is an image of it, in seconds from the drive's
-    /// first time stamp.
+    /// The time of a frame number, in seconds from the drive's first time stamp, also for numbers without an
+    /// image.
     #[must_use]
     pub fn time_of(&self, number: u64) -> Option<f64> {
         let frames = self.frames();
@@ -232,20 +232,19 @@ impl Dataset {
         }
     }
 
-    /// The camera of a frame's image as [`Self::load_image`] gives it.
+    /// Intrinsics of the images returned by [`Self::load_image`], in pixels.
     #[must_use]
     pub fn intrinsics(&self, _frame: usize) -> Intrinsics {
         self.parts.intrinsics
     }
 
-    /// A frame's image at full size, freed of its lens' distortion.
+    /// A frame's image at full size, corrected for lens distortion.
     ///
     /// # Errors
-    /// As [`crate::load_rgb`], [`Error::FrameSize`], and [`Error::Video`] where a video cannot be
-    /// decoded.
+    /// Those of [`crate::load_rgb`], [`Error::FrameSize`], and [`Error::Video`] if a video cannot be decoded.
     ///
     /// # Panics
-    /// If there is no frame of that index.
+    /// If there is no frame with that index.
     pub fn load_image(&self, frame: usize) -> Result<RgbImage> {
         let frame = &self.frames()[frame];
         let image = self.recording.load_image(frame)?;
@@ -253,14 +252,14 @@ impl Dataset {
         Ok(image)
     }
 
-    /// That a frame's image can be read, where it is a file of its own; as [`deepfusion_images::check_whole`], which hardly takes longer than to open
-    /// the file.
+    /// Checks that a frame's image can be read, if it is a file of its own. Uses [`deepfusion_images::check_whole`], which takes hardly
+    /// longer than opening the file.
     ///
     /// # Errors
-    /// As [`crate::load_rgb`].
+    /// Those of [`crate::load_rgb`].
     ///
     /// # Panics
-    /// If there is no frame of that index.
+    /// If there is no frame with that index.
     pub fn check_image(&self, frame: usize) -> Result<()> {
         match self.frames()[frame].image.file() {
             Some(file) => Ok(deepfusion_images::check_whole(file)?),
@@ -268,14 +267,14 @@ impl Dataset {
         }
     }
 
-    /// Whether [`Self::load_image`] undoes a distortion, so that its picture is not that of the frame's file.
+    /// Whether [`Self::load_image`] corrects a lens distortion, so that its image differs from the file's.
     #[must_use]
     pub fn corrects_lens(&self) -> bool {
         self.recording.corrects_lens()
     }
 
-    /// Reads the header of every image that is a file: that takes some microseconds each, and a wrong
-    /// size found now is not found at night.
+    /// Checks the size of every image file. Reading a header takes only microseconds, and a wrong size should be
+    /// found now, not in the middle of a long training.
     ///
     /// # Errors
     /// [`Error::FrameSize`], [`Error::Image`].
@@ -305,34 +304,34 @@ impl Dataset {
         })
     }
 
-    /// What was recorded, stream by stream.
+    /// The recorded streams.
     ///
     /// # Errors
-    /// Where a stream is there and cannot be read.
+    /// If an existing stream cannot be read.
     pub fn streams(&self) -> Result<Vec<Stream>> {
         self.recording.streams()
     }
 
-    /// Where its sensors are, and by whom; of a bag.
+    /// A bag's sensor mounts, with their sources.
     #[must_use]
     pub fn mounts(&self) -> &[Mount] {
         self.recording.mounts()
     }
 
-    /// What was taken for granted, looks odd or cannot be read.
+    /// Assumptions, oddities and unreadable parts.
     #[must_use]
     pub fn warnings(&self) -> &[DataWarning] {
         &self.warnings
     }
 
-    /// Those of [`Self::warnings`] that say what of the recording cannot be read.
+    /// Those of [`Self::warnings`] about unreadable parts of the recording.
     #[must_use]
     pub fn damage(&self) -> &[DataWarning] {
         self.recording.damage()
     }
 
-    /// That of [`Self::warnings`] which says what else in the folder that was [opened](Self::open) looks like a recording and is not read. It
-    /// names the folder, and is about no single recording in it: the first of them has it.
+    /// The one of [`Self::warnings`] about other recordings in the [opened](Self::open) folder that were not read. It concerns
+    /// the folder, so only the first data set of a folder has it.
     #[must_use]
     pub fn passed_over(&self) -> Option<&DataWarning> {
         self.warnings.iter().find(|warning| {
@@ -343,12 +342,12 @@ impl Dataset {
         })
     }
 
-    /// Adds what was noticed beside it.
+    /// Adds a warning about the recording's surroundings.
     pub(crate) fn warn(&mut self, warning: impl Into<DataWarning>) {
         self.warnings.push(warning.into());
     }
 
-    /// Stretches of at least two frames whose numbers follow each other, by index.
+    /// Sequences of at least two frames with consecutive numbers, as indices.
     #[must_use]
     pub fn stretches(&self) -> Vec<Vec<usize>> {
         let frames = self.frames();

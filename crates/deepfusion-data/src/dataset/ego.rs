@@ -1,50 +1,50 @@
-//! The camera's motion between two frames, from the car's.
+//! The camera's motion between two frames, from the vehicle's.
 
 use super::frame::Frame;
 use crate::{MotionModel, VehicleMotion};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::Signal;
 
-/// How the camera moved between a target frame and one of its sources.
+/// The camera's motion between a target frame and one of its sources.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EgoMotion {
     /// Time between the two, in seconds, positive.
     pub dt_s: f64,
     /// Length of the camera's translation, in metres.
     pub distance_m: f64,
-    /// Standard deviation of that length, in metres, where the speeds say how sure they are. Their errors are taken to be the same
-    /// all the way from one frame to the other, as those of a smoothed track are.
+    /// Standard deviation of that length, in metres, if the speeds have standard deviations. Their errors are assumed to be fully
+    /// correlated between the two frames, as in a smoothed track.
     pub distance_sigma_m: Option<f64>,
-    /// The car's mean speed over that time, in m/s, positive also when reversing.
+    /// The vehicle's mean speed over that time, in m/s, positive also in reverse.
     pub speed_mps: f64,
-    /// A point of the target's camera frame in the source's. Driving ahead, its z is negative for the
-    /// frame after the target and positive for the one before. `None` where neither a sensor nor, where
-    /// they were asked, the images know how the car turned: then only lengths may be used.
+    /// Transforms points from the target's camera frame to the source's, in metres. When driving forward, its z
+    /// translation is negative for the frame after the target and positive for the one before. `None` if turns were neither
+    /// measured nor estimated from the images: then only lengths may be used.
     pub source_from_target: Option<Se3>,
 }
 
-/// What a satellite receiver's track says beside the speeds, on the frames' clock.
+/// A GPS receiver's measurements other than speed, on the frames' clock.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Receiver {
-    /// How the course over ground turned where the vehicle moved, in rad/s, positive to the left. It is spread over a second or
-    /// so: enough for the offset of two clocks, not for a camera's turn between two frames.
+    /// Rate of turn of the course over ground while the vehicle moved, in rad/s, positive to the left. It is smoothed over about
+    /// a second: enough for the offset of two clocks, not for a camera's turn between two frames.
     pub course_rate_radps: Option<Signal>,
-    /// Standard deviation of the speeds, in m/s; of other logs that say how sure they are, too.
+    /// Standard deviation of the speeds, in m/s; also from other logs that have one.
     pub speed_sigma_mps: Option<Signal>,
 }
 
-/// The car's track and the camera's place on the car: [`Dataset::ego`](crate::Dataset::ego).
+/// The vehicle's track and the camera's mount on it, from [`Dataset::ego`](crate::Dataset::ego).
 #[derive(Debug, Clone, Copy)]
 pub struct Ego<'a> {
-    /// How the vehicle moved, on the frames' clock.
+    /// The vehicle's motion, on the frames' clock.
     pub(crate) track: &'a MotionModel,
-    /// Whether its turns are known: measured, or taken from the images.
+    /// Whether its turns are known: measured, or estimated from the images.
     pub(crate) yaw_known: bool,
-    /// A point of the vehicle (x forward, y left, z up, metres) in the camera.
+    /// Transforms points from the vehicle (x forward, y left, z up) to the camera, in metres.
     pub cam_from_vehicle: Se3,
-    /// How sure the speeds are, where that is known.
+    /// Standard deviation of the speeds, in m/s, if known.
     pub(crate) speed_sigma_mps: Option<&'a Signal>,
-    /// Whether the body's roll and pitch, where they are known, turn the camera.
+    /// Whether the body's known roll and pitch are applied to the camera.
     pub(crate) rolls_and_pitches: bool,
 }
 
@@ -54,18 +54,18 @@ pub struct Ego<'a> {
 pub enum NoMotion {
     /// Their time stamps do not increase with their numbers.
     Time,
-    /// No speed was measured about their time.
+    /// No speed was measured around their times.
     Speed,
 }
 
 impl Ego<'_> {
-    /// Whether its turns to the side are known: measured, or taken from the images.
+    /// Whether its yaw is known: measured, or estimated from the images.
     #[must_use]
     pub fn yaw_known(&self) -> bool {
         self.yaw_known
     }
 
-    /// The same on a body without roll and pitch: for what measures them in the pictures.
+    /// The same without roll and pitch, for estimating these from the images.
     #[must_use]
     pub fn level(self) -> Self {
         Self {
@@ -74,7 +74,7 @@ impl Ego<'_> {
         }
     }
 
-    /// What the vehicle did between two times, in seconds; `None` where no speed was measured.
+    /// The vehicle's motion between two times, in seconds; `None` if no speed was measured.
     #[must_use]
     pub fn vehicle_motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
         let motion = self.track.motion(from_s, to_s)?;
@@ -85,13 +85,13 @@ impl Ego<'_> {
         })
     }
 
-    /// The camera's motion between two frames given by index, in either order of time.
+    /// The camera's motion between two frames, given by index in either order of time.
     ///
     /// # Errors
-    /// Why it is unknown.
+    /// The reason if it is unknown.
     ///
     /// # Panics
-    /// If there is no frame of such an index.
+    /// If there is no frame with one of the indices.
     pub fn between(
         &self,
         frames: &[Frame],
@@ -110,12 +110,12 @@ impl Ego<'_> {
         let dt_s = to_s - from_s;
         Ok(EgoMotion {
             dt_s,
-            // Without a yaw rate the track's is 0: this is then the way the vehicle itself went.
+            // Without a yaw rate, the track's is 0, and this is the distance travelled by the vehicle itself.
             distance_m: earlier_from_later.translation().norm(),
             distance_sigma_m: self
                 .speed_sigma_mps
                 .and_then(|sigma| Some(sigma.at(0.5 * (from_s + to_s))? * dt_s))
-                // A log's own NaN says no more than an empty cell.
+                // A NaN in a log means the same as an empty cell.
                 .filter(|sigma_m| sigma_m.is_finite()),
             speed_mps: vehicle.distance_m.abs() / dt_s,
             source_from_target: self.yaw_known.then(|| {

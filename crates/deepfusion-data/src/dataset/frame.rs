@@ -1,4 +1,4 @@
-//! One image of a recording, before it is read.
+//! A frame of a recording: an image that has not been read yet.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -8,34 +8,33 @@ use std::path::{Path, PathBuf};
 pub struct Frame {
     /// Name of its drive.
     pub drive: String,
-    /// Its number in the drive; numbers may be missing. Frames whose numbers follow each other are
-    /// neighbours.
+    /// Its number in the drive; numbers may be missing. Frames with consecutive numbers are neighbours.
     pub number: u64,
-    /// Seconds from the drive's first time stamp; `None` where the drive has no time stamp of it.
+    /// Seconds from the drive's first time stamp; `None` if the frame has no time stamp.
     pub time_s: Option<f64>,
-    /// Where its image is.
+    /// Location of its image.
     pub image: FrameImage,
-    /// The car's forward speed at that time, in m/s; `None` where it is unknown.
+    /// The vehicle's forward speed at that time, in m/s; `None` if unknown.
     pub speed_mps: Option<f64>,
 }
 
-/// Where a frame's image is. Read it with [`crate::Dataset::load_image`]: it may have to be decoded, and
-/// freed of its lens' distortion.
+/// Location of a frame's image. Read the image with [`crate::Dataset::load_image`]: it may have to be decoded and
+/// corrected for lens distortion.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FrameImage {
-    /// A file of its own.
+    /// The image is a file of its own.
     File(PathBuf),
-    /// One of many in a file, such as a video or a bag.
+    /// One of many images in a file, such as a video or a bag.
     Within {
-        /// That file.
+        /// Path of that file.
         file: PathBuf,
-        /// Which of its images, counted from 0.
+        /// Number of the image in that file, counted from 0.
         index: u64,
     },
 }
 
 impl FrameImage {
-    /// The file that holds the image, alone or with others.
+    /// Path of the file that contains the image, alone or with others.
     #[must_use]
     pub fn path(&self) -> &Path {
         match self {
@@ -43,7 +42,7 @@ impl FrameImage {
         }
     }
 
-    /// The image's own file, if it has one.
+    /// Path of the image's own file, if it has one.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         match self {

@@ -1,34 +1,34 @@
-//! Where a camera looks against where its vehicle goes.
+//! The camera's viewing direction relative to the vehicle's direction of travel.
 //!
-//! Driving straight, everything in the images streams out of the point that the vehicle heads for. A camera that looks a degree below it
-//! sees the road move as one would that is an eighth lower, so depth learned with the wrong direction comes out an eighth too near.
+//! When driving straight, the optical flow expands from the point that the vehicle heads for. If a camera looks a degree below it,
+//! the road moves in its images as for a camera mounted an eighth lower, so depth learned with the wrong direction is an eighth too small.
 
 use deepfusion_geometry::Se3;
 use nalgebra::{Vector2, Vector3};
 use std::fmt;
 
-/// Standard error of a heading that is sure enough to be taken, radians: a quarter of a degree.
+/// Largest standard error of a heading that is used, radians: a quarter of a degree.
 const SURE: f64 = 0.0044;
-/// A heading that is further off is another error, or no road vehicle's: ten degrees, in radians.
+/// Largest offset of a heading that is used, radians: ten degrees. A larger one has another cause.
 const MOST: f64 = 0.175;
 
-/// By how much the direction of travel, as images show it, differs from what the mount says.
+/// Difference between the direction of travel in the images and that according to the mount.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading {
-    /// Further up and to the right in the image, radians: a camera that looks down heads for a point above its middle.
+    /// Offset up and to the right in the image, radians. A camera that looks down heads for a point above the image centre.
     pub off: Vector2<f64>,
     /// Standard errors of both, radians.
     pub std_error: Vector2<f64>,
 }
 
 impl Heading {
-    /// Whether it is known well enough to be taken for the mount's error: to a quarter of a degree, and at most ten degrees.
+    /// Whether it can be used to correct the mount: its standard errors are at most a quarter of a degree, and it is at most ten degrees.
     #[must_use]
     pub fn is_sure(&self) -> bool {
         self.std_error.iter().all(|error| *error <= SURE) && self.off.norm() <= MOST
     }
 
-    /// Turns a point of the camera as the mount has it into the camera as it is.
+    /// The rotation from the camera according to the mount to the true camera.
     #[must_use]
     pub fn turn(&self) -> Se3 {
         Se3::from_axis_angle(Vector3::new(self.off.x, self.off.y, 0.0), Vector3::zeros())
@@ -44,7 +44,7 @@ impl fmt::Display for Heading {
         let side = |off: f64, [more, less]: [&'static str; 2]| if off > 0.0 { more } else { less };
         write!(
             f,
-            "driving straight, its images show that it looks {:.1} ± {:.1} degrees {} and {:.1} ± {:.1} degrees {}, and that is taken",
+            "according to its images when driving straight, it looks {:.1} ± {:.1} degrees {} and {:.1} ± {:.1} degrees {}, which is used",
             off.x.abs(),
             error.x,
             side(off.x, ["down", "up"]),

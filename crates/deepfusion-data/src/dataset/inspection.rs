@@ -1,4 +1,4 @@
-//! What is in a recording, as `data inspect` prints it.
+//! The contents of a recording, as printed by `data inspect`.
 
 use super::kind::DatasetKind;
 use super::warning::DataWarning;
@@ -9,44 +9,44 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What `data inspect` reports, of one drive or several.
+/// The report of `data inspect`, for one or several drives.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
     /// The layout.
     pub kind: DatasetKind,
-    /// Images of the camera, over all drives.
+    /// Number of images of the camera, over all drives.
     pub frames: usize,
-    /// Width and height of the images; `None` (JSON `null`) where there are none.
+    /// Width and height of the images, in pixels; `None` (JSON `null`) without images.
     pub size: Option<[u32; 2]>,
-    /// Their camera, after the lens' distortion was taken out.
+    /// Their intrinsics, after correction of the lens distortion.
     pub intrinsics: Option<IntrinsicsSummary>,
-    /// What was recorded, with its drive before its name where there are several.
+    /// The recorded streams; with several drives, their names start with the drive.
     pub streams: Vec<Stream>,
-    /// Speeds at the frames; `None` (JSON `null`) where they are unknown.
+    /// Speeds at the frames; `None` (JSON `null`) if unknown.
     pub speed_mps: Option<SpeedRange>,
-    /// Distance driven between first and last frames, in metres, gaps left out.
+    /// Distance driven between the first and last frames, in metres, without gaps.
     pub distance_m: Option<f64>,
-    /// Time from first to last frames, in seconds.
+    /// Time from the first to the last frames, in seconds.
     pub duration_s: Option<f64>,
-    /// Each drive by itself.
+    /// The individual drives.
     pub drives: Vec<DriveInspection>,
-    /// Of several recordings those that cannot be read, which the figures above leave out; absent from JSON where there are none.
+    /// Those of several recordings that cannot be read; the values above do not include them. Absent from JSON if empty.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unreadable: Vec<Unreadable>,
 }
 
-/// One of several recordings, which cannot be read.
+/// One of several recordings that cannot be read.
 #[derive(Debug, Clone, Serialize)]
 pub struct Unreadable {
-    /// Its file or folder.
+    /// Path of its file or folder.
     #[serde(serialize_with = "path_text")]
     pub path: PathBuf,
-    /// Why it cannot; its message in JSON.
+    /// Why it cannot be read; in JSON the error's message.
     #[serde(serialize_with = "text")]
     pub error: Arc<Error>,
 }
 
-/// Errors are alike by what they say.
+/// Errors are equal if their messages are.
 impl PartialEq for Unreadable {
     fn eq(&self, other: &Self) -> bool {
         let said = |one: &Self| (one.path.clone(), one.error.to_string());
@@ -71,63 +71,63 @@ fn texts<S: Serializer>(warnings: &[DataWarning], serializer: S) -> Result<S::Ok
 pub struct DriveInspection {
     /// The drive's name.
     pub name: String,
-    /// The camera looked at: 2, or 3 where no drive has images of 2. Layouts other than KITTI's have one, which counts as 2.
+    /// The inspected camera: 2, or 3 if no drive has images of 2. Layouts other than KITTI's have a single one, which counts as 2.
     pub camera: u8,
-    /// Its images.
+    /// Number of its images.
     pub frames: usize,
-    /// Numbers that are missing between its first and last image, as ranges `[from, to]`.
+    /// Numbers missing between its first and last image, as ranges `[from, to]`.
     pub missing_frames: Vec<[u64; 2]>,
-    /// Pairs of neighbouring frames that can train at 0.5 m/s or more.
+    /// Number of pairs of neighbouring frames that can be used for training at 0.5 m/s or more.
     pub usable_pairs: usize,
-    /// Why there are none, if so.
+    /// Why there are no usable pairs; `None` if there are some.
     pub why_no_pairs: Option<String>,
-    /// Frames with ground truth: a velodyne scan or a depth image.
+    /// Number of frames with ground truth: a LiDAR scan or a depth image.
     pub scans: usize,
     /// Speeds at the frames.
     pub speed_mps: Option<SpeedRange>,
     /// Distance driven, in metres.
     pub distance_m: Option<f64>,
-    /// Sum of the changes of heading, in radians, positive to the left; `None` where no yaw rate was recorded.
+    /// Sum of the changes of heading, in radians, positive to the left; `None` if no yaw rate was recorded.
     pub turn_rad: Option<f64>,
     /// Time from the first to the last frame, in seconds.
     pub duration_s: Option<f64>,
-    /// What was taken off the images' times, in seconds: how far the camera's clock is ahead of the vehicle's, as the
-    /// recording's file or the caller says.
+    /// How far the camera's clock is ahead of the vehicle's, in seconds, according to the recording's file or the caller; already
+    /// subtracted from the images' times.
     pub camera_ahead_s: f64,
-    /// How far the vehicle's clock is then still ahead of the camera's, by how the pictures moved. `None` where nobody
-    /// measured it ([`crate::inspect_with`]), the drive does not show it, or there are several drives.
+    /// The remaining offset of the vehicle's clock from the camera's, measured from the motion in the images. `None` if it was not
+    /// measured ([`crate::inspect_with`]), the drive does not show it, or there are several drives.
     pub time_offset: Option<ClockOffset>,
-    /// Where its sensors are, and by whom; of a bag.
+    /// A bag's sensor mounts, with their sources.
     pub mounts: Vec<Mount>,
-    /// What was taken for granted or looks odd; `remarks` in JSON, in sentences.
+    /// Assumptions and oddities; in JSON `remarks`, as sentences.
     #[serde(rename = "remarks", serialize_with = "texts")]
     pub warnings: Vec<DataWarning>,
 }
 
-/// Where a sensor is, as the file beside a bag has it.
+/// A sensor's mount, in the form of the file beside a bag.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mount {
-    /// Which transform: `cam_from_vehicle`, `cam_from_lidar`, `vehicle_from_imu`. Camera axes: x right, y down, z forward; the
-    /// others': x forward, y left, z up.
+    /// Name of the transform: `cam_from_vehicle`, `cam_from_lidar`, `vehicle_from_imu`. Camera axes are x right, y down, z forward; the
+    /// other frames' axes are x forward, y left, z up.
     pub name: &'static str,
-    /// Who says so.
+    /// Where the mount comes from.
     pub source: String,
-    /// In metres.
+    /// Translation, in metres.
     pub translation: [f64; 3],
-    /// An axis-angle vector in radians.
+    /// Rotation as an axis-angle vector, in radians.
     pub rotation: [f64; 3],
 }
 
-/// The vehicle's clock less the camera's.
+/// The vehicle's clock minus the camera's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ClockOffset {
-    /// What to add to the camera's times, as they were opened, to have the vehicle's, in seconds.
+    /// Add this to the camera's times, as opened, to get the vehicle's, in seconds.
     pub vehicle_minus_camera_s: f64,
     /// Its standard error, in seconds.
     pub std_error_s: f64,
 }
 
-/// A camera's numbers, in pixels.
+/// A camera's intrinsics, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct IntrinsicsSummary {
     /// Focal length along x.
@@ -140,35 +140,35 @@ pub struct IntrinsicsSummary {
     pub cy: f64,
 }
 
-/// One sensor's recording.
+/// A recorded stream of one sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Stream {
-    /// Its folder or file, such as `image_02` or `speed.csv`.
+    /// Name of its folder, file or topic, such as `image_02` or `speed.csv`.
     pub name: String,
-    /// What it holds: `image`, `point_cloud`, `oxts`, `speed`, `imu`, `steering`, `depth`, `pose`, `frames`.
+    /// What it contains: `image`, `point_cloud`, `oxts`, `speed`, `imu`, `steering`, `depth`, `pose`, `frames`.
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// How many samples.
+    /// Number of samples.
     pub count: usize,
-    /// One over the median interval, in Hz.
+    /// Inverse of the median interval, in Hz.
     pub rate_hz: Option<f64>,
-    /// Intervals longer than one and a half medians.
+    /// Number of intervals longer than 1.5 times the median.
     pub gaps: usize,
 }
 
-/// Least, mean and greatest speed, in m/s.
+/// Lowest, mean and highest speed, in m/s.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpeedRange {
-    /// Least.
+    /// Lowest speed.
     pub min: f64,
-    /// Mean over frames.
+    /// Mean over the frames.
     pub mean: f64,
-    /// Greatest.
+    /// Highest speed.
     pub max: f64,
 }
 
 impl Stream {
-    /// A stream of `count` samples at these times, in seconds; empty where they are not known.
+    /// A stream of `count` samples at these times, in seconds; give no times if they are unknown.
     #[must_use]
     pub fn new(name: &str, kind: &'static str, count: usize, times_s: &[f64]) -> Self {
         let intervals: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
@@ -186,7 +186,7 @@ impl Stream {
 }
 
 impl SpeedRange {
-    /// Of speeds in m/s; `None` where there are none.
+    /// The range of these speeds in m/s; `None` if there are none.
     pub(crate) fn of(speeds_mps: impl Iterator<Item = f64>) -> Option<Self> {
         let speeds: Vec<f64> = speeds_mps.collect();
         (!speeds.is_empty()).then(|| Self {

@@ -1,4 +1,4 @@
-//! An inspection in words.
+//! An inspection as text.
 
 use super::inspection::{DriveInspection, Inspection, SpeedRange, Stream, Unreadable};
 use super::kind::DatasetKind;
@@ -13,9 +13,7 @@ impl fmt::Display for Inspection {
                 let frames = count_of(self.frames, "frame");
                 writeln!(f, "{layout}, {frames} of {w}x{h}")?;
             }
-            None if self.drives.is_empty() => {
-                writeln!(f, "{layout}, of which nothing can be read")?
-            }
+            None if self.drives.is_empty() => writeln!(f, "{layout}, unreadable")?,
             None => writeln!(f, "{layout} without images")?,
         }
         if let Some(k) = &self.intrinsics {
@@ -38,7 +36,7 @@ impl fmt::Display for Inspection {
     }
 }
 
-/// A drive's lines.
+/// Writes the lines about a drive.
 fn drive(f: &mut fmt::Formatter<'_>, kind: DatasetKind, drive: &DriveInspection) -> fmt::Result {
     let known = |value: Option<f64>, unit: &str| match value {
         Some(value) => format!("{:.1} {unit}", unsigned_zero(value)),
@@ -74,14 +72,14 @@ fn drive(f: &mut fmt::Formatter<'_>, kind: DatasetKind, drive: &DriveInspection)
     if drive.camera_ahead_s != 0.0 {
         writeln!(
             f,
-            "  clocks    camera ahead by {:.0} ms as was said, taken off its times",
+            "  clocks    camera ahead by {:.0} ms (as given), subtracted from its times",
             ms(drive.camera_ahead_s)
         )?;
     }
     if let Some(offset) = drive.time_offset {
         writeln!(
             f,
-            "  clocks    vehicle less camera {:.0} ms, standard error {:.0} ms",
+            "  clocks    vehicle minus camera {:.0} ms, standard error {:.0} ms",
             ms(offset.vehicle_minus_camera_s),
             ms(offset.std_error_s)
         )?;
@@ -115,7 +113,7 @@ fn drive(f: &mut fmt::Formatter<'_>, kind: DatasetKind, drive: &DriveInspection)
     Ok(())
 }
 
-/// The table of the streams.
+/// Writes the table of streams.
 fn streams(f: &mut fmt::Formatter<'_>, streams: &[Stream]) -> fmt::Result {
     let width = streams.iter().map(|s| s.name.len()).max().unwrap_or(0);
     let width = width.max("stream".len());
@@ -137,7 +135,7 @@ fn streams(f: &mut fmt::Formatter<'_>, streams: &[Stream]) -> fmt::Result {
     Ok(())
 }
 
-/// A value that one decimal shows as 0 or −0 as 0.
+/// The value, or 0 if it would be printed as −0.0.
 fn unsigned_zero(value: f64) -> f64 {
     if value.abs() < 0.05 { 0.0 } else { value }
 }

@@ -1,8 +1,8 @@
-//! The layouts by name.
+//! The names of the layouts.
 
 use serde::{Deserialize, Serialize};
 
-/// The layout a recording came in.
+/// Layout of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DatasetKind {
@@ -22,16 +22,16 @@ pub enum DatasetKind {
     Video,
     /// A comma2k19 segment.
     Comma2k19,
-    /// A folder of colour, depth and pose files, as 7-Scenes has.
+    /// A folder of colour, depth and pose files, as in 7-Scenes.
     RgbD,
     /// A ROS bag.
     Bag,
-    /// A layout of somebody else's: a [`crate::Recording`] from outside this crate.
+    /// A layout from another crate, which implements [`crate::Recording`].
     Other,
 }
 
 impl DatasetKind {
-    /// Its name in text.
+    /// The layout's name, as printed.
     #[must_use]
     pub fn label(self) -> &'static str {
         match self {
@@ -47,7 +47,7 @@ impl DatasetKind {
             Self::Other => "recording",
         }
     }
-    /// Whether its recordings say what their camera is, so that none can be given.
+    /// Whether its recordings include a calibration, so that none can be given.
     pub(crate) fn brings_calibration(self) -> bool {
         use DatasetKind::{Kitti360, KittiOdometry, KittiRaw, NuScenes};
         matches!(self, KittiRaw | KittiOdometry | Kitti360 | NuScenes)

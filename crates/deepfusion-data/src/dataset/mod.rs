@@ -1,7 +1,7 @@
-//! What every layout becomes: a [`Dataset`] of [`Frame`]s, with [`Snippet`]s to train on.
+//! A recording of any layout as a [`Dataset`] of [`Frame`]s, with [`Snippet`]s to train on.
 //!
-//! `recording` and `parts` are what a layout has to offer, `drive` what is made of it; `ego` says how the camera moved, `split` and `selection` which
-//! frames are meant, `inspection` what is there, `warning` what is unsure about it.
+//! `recording` and `parts` are what a layout provides, and `drive` is the data set made from it. `ego` computes the camera's motion,
+//! `split` and `selection` select frames, `inspection` reports the contents, and `warning` what is uncertain.
 
 mod camera;
 mod coverage;

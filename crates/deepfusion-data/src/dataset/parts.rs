@@ -1,41 +1,41 @@
-//! The plain values of a data set.
+//! Those parts of a data set that are plain values.
 
 use super::camera::Camera;
 use super::frame::Frame;
 use crate::{MotionModel, VehicleTrack};
 use deepfusion_geometry::{Intrinsics, Se3};
 
-/// What every layout has: the parts of a [`Dataset`](crate::Dataset) that are plain values.
+/// The parts of a [`Dataset`](crate::Dataset) that are plain values, which every layout has.
 #[derive(Debug, Clone)]
 pub struct DatasetParts {
     /// The drive's name.
     pub name: String,
-    /// Its name in split files; KITTI raw's is `<date>/<drive>`.
+    /// The drive's name in split files; `<date>/<drive>` for KITTI raw.
     pub split_name: String,
-    /// The camera whose images these are.
+    /// The camera that took the images.
     pub camera: Camera,
-    /// All frames, by number.
+    /// All frames, ordered by number.
     pub frames: Vec<Frame>,
-    /// Of the images as [`Recording::load_image`](crate::Recording::load_image) gives them.
+    /// Intrinsics of the images returned by [`Recording::load_image`](crate::Recording::load_image), in pixels.
     pub intrinsics: Intrinsics,
-    /// A point of the vehicle (x forward, y left, z up, where speed and yaw rate are measured) in the
-    /// camera; `None` where the layout has to know it and does not.
+    /// Transforms points from the vehicle (x forward, y left, z up, origin where speed and yaw rate are measured) to the
+    /// camera, in metres; `None` if the layout should have this transform but it is missing.
     pub cam_from_vehicle: Option<Se3>,
-    /// The car's speed and yaw rate, where the drive has them.
+    /// The vehicle's speed and yaw rate, if the drive has them.
     pub track: Option<MotionModel>,
-    /// Whether the track's yaw rates were measured. Where not, they are 0 and mean nothing.
+    /// Whether the track's yaw rates were measured. If not, they are 0 and meaningless.
     pub yaw_known: bool,
-    /// Nanoseconds from which seconds are counted, on the vehicle's clock: since 1970 or whatever it starts at.
+    /// Origin of the times in seconds, in nanoseconds on the vehicle's clock: since 1970, or since that clock's own start.
     pub origin_ns: Option<i64>,
-    /// What was taken off the images' times, in seconds: how far the camera's clock is ahead of the vehicle's.
+    /// How far the camera's clock is ahead of the vehicle's, in seconds; already subtracted from the images' times.
     pub camera_ahead_s: f64,
-    /// The kind of drive, such as `garage`, for a row each in an evaluation.
+    /// The kind of drive, such as `garage`; an evaluation has a row for each.
     pub scenario: Option<String>,
 }
 
 impl DatasetParts {
-    /// A drive of which no more is known than its frames, their times and speeds: its camera looks ahead, at the vehicle's own place, and nothing
-    /// says how it turned.
+    /// The parts of a drive of which only frames, times and speeds are known: the camera looks straight ahead from the vehicle's origin,
+    /// and turns are unknown.
     #[must_use]
     pub fn of_frames(name: &str, frames: Vec<Frame>, intrinsics: Intrinsics) -> Self {
         let samples = frames.iter();
@@ -57,7 +57,7 @@ impl DatasetParts {
     }
 }
 
-/// The vehicle's axes (x ahead, y to the left, z up) in a camera's (x to the right, y down, z ahead) at its origin.
+/// The transform from the vehicle (x forward, y left, z up) to a camera (x right, y down, z forward) at its origin.
 fn looks_ahead() -> Se3 {
     Se3::from_quaternion([0.5, 0.5, -0.5, 0.5], Se3::identity().translation())
 }

@@ -1,4 +1,4 @@
-//! What a layout has to offer for its recordings to be a [`Dataset`].
+//! The interface that a layout implements so that its recordings become a [`Dataset`].
 
 use super::drive::Dataset;
 use super::frame::Frame;
@@ -12,31 +12,31 @@ use image::RgbImage;
 use std::fmt;
 use std::path::Path;
 
-/// Where a data set's images and labels come from; one implementation a layout.
+/// Source of a data set's images and labels; each layout has one implementation.
 ///
-/// What all layouts share (frames, times, camera, speeds) is in [`crate::DatasetParts`]; this is the rest,
-/// read when it is asked for. The provided methods are those of a recording that has no such thing.
+/// What all layouts have in common (frames, times, camera, speeds) is in [`crate::DatasetParts`]. This trait is the rest,
+/// which is read on request. The default methods are for recordings without such data.
 pub trait Recording: fmt::Debug + Send + Sync {
-    /// The layout; another than those of this library where nothing is said.
+    /// The layout; by default [`DatasetKind::Other`].
     fn kind(&self) -> DatasetKind {
         DatasetKind::Other
     }
 
-    /// The folder its files are in.
+    /// Folder of the recording's files.
     fn folder(&self) -> &Path;
 
-    /// A frame's image, freed of its lens' distortion, at the size of the data set's intrinsics.
+    /// A frame's image, corrected for lens distortion, at the size of the data set's intrinsics.
     ///
     /// # Errors
-    /// Where it cannot be read.
+    /// If it cannot be read.
     fn load_image(&self, frame: &Frame) -> Result<RgbImage>;
 
-    /// Whether [`Self::load_image`] undoes a distortion, so that the picture is not that of the frame's file.
+    /// Whether [`Self::load_image`] corrects a lens distortion, so that its image differs from the file's.
     fn corrects_lens(&self) -> bool {
         false
     }
 
-    /// Where the camera's numbers are from, for the error on an image of another size.
+    /// Where the camera's intrinsics come from, for the error about an image of another size.
     fn calibration(&self) -> CalibrationPlace {
         CalibrationPlace {
             source: self.folder().into(),
@@ -44,15 +44,15 @@ pub trait Recording: fmt::Debug + Send + Sync {
         }
     }
 
-    /// What was recorded beside the frames.
+    /// The recorded streams.
     ///
     /// # Errors
-    /// Where a stream is there and cannot be read.
+    /// If an existing stream cannot be read.
     fn streams(&self) -> Result<Vec<Stream>> {
         Ok(Vec::new())
     }
 
-    /// What is missing for the car's motion, asked where the data set lacks times, track or mount.
+    /// The error about what is missing for the vehicle's motion, used if the data set lacks times, track or mount.
     fn no_motion(&self) -> Error {
         Error::Missing {
             path: self.folder().to_owned(),
@@ -60,51 +60,51 @@ pub trait Recording: fmt::Debug + Send + Sync {
         }
     }
 
-    /// What was taken for granted, looks odd or cannot be read; what no other variant says is a [`DataWarning::Other`].
+    /// Assumptions, oddities and unreadable parts; use [`DataWarning::Other`] if no other variant fits.
     fn warnings(&self) -> &[DataWarning] {
         &[]
     }
 
-    /// Those of [`Self::warnings`] that say what cannot be read.
+    /// Those of [`Self::warnings`] about unreadable parts.
     fn damage(&self) -> &[DataWarning] {
         &[]
     }
 
-    /// Where its sensors are, where the recording can tell who says so.
+    /// The sensors' mounts, if their sources are known.
     fn mounts(&self) -> &[Mount] {
         &[]
     }
 
-    /// Whether [`Self::ground_truth`] will have something for a frame.
+    /// Whether a frame has [ground truth](Self::ground_truth).
     fn has_ground_truth(&self, _frame: &Frame, _kind: GtKind) -> bool {
         false
     }
 
-    /// Depth of a frame in metres (camera z), at the size of its image, 0 = none.
+    /// Depth of a frame in metres (camera z), at the size of its image, 0 = no depth.
     ///
     /// # Errors
-    /// Where it is there and cannot be read.
+    /// If it exists, but cannot be read.
     fn ground_truth(&self, _frame: &Frame, _kind: GtKind) -> Result<Option<DepthMap>> {
         Ok(None)
     }
 
-    /// Whether [`Self::dense_depth`] will have something for a frame.
+    /// Whether a frame has [dense depth](Self::dense_depth).
     fn has_dense_depth(&self, _frame: &Frame) -> bool {
         false
     }
 
-    /// Depth of every pixel, where the recording knows it beside its scans: [`Dataset::dense_depth`].
+    /// Depth of every pixel, if the recording has it in addition to scans. See [`Dataset::dense_depth`].
     ///
     /// # Errors
-    /// Where it is there and cannot be read.
+    /// If it exists, but cannot be read.
     fn dense_depth(&self, _frame: &Frame) -> Result<Option<DepthMap>> {
         Ok(None)
     }
 
-    /// [`Self::ground_truth`] with the velocities that were measured beside it.
+    /// [`Self::ground_truth`] with the measured velocities.
     ///
     /// # Errors
-    /// As [`Self::ground_truth`].
+    /// Those of [`Self::ground_truth`].
     fn scan_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<ScanTruth>> {
         let depth = self.ground_truth(frame, kind)?;
         Ok(depth.map(|depth| ScanTruth {
@@ -113,33 +113,33 @@ pub trait Recording: fmt::Debug + Send + Sync {
         }))
     }
 
-    /// What tells dynamic pixels from static ones.
+    /// Labels of dynamic and static pixels.
     ///
     /// # Errors
-    /// Where it is there and cannot be read.
+    /// If they exist, but cannot be read.
     fn moving_labels(&self, _dataset: &Dataset) -> Result<Option<MovingLabels>> {
         Ok(None)
     }
 
-    /// The vehicle's velocity as a LiDAR that measures radial velocities saw it, in at most `most` scans spread over
-    /// the drive; none where there is no such LiDAR.
+    /// The vehicle's velocity from a LiDAR that measures radial velocities, for at most `most` scans spread over
+    /// the drive; empty if there is no such LiDAR.
     ///
     /// # Errors
-    /// Where a scan cannot be read.
+    /// If a scan cannot be read.
     fn lidar_motion(&self, _most: usize) -> Result<Vec<LidarMotion>> {
         Ok(Vec::new())
     }
 
-    /// How far a topic of dynamic points agrees with the radial velocities, in at most `most` scans spread over the
-    /// drive; `None` where the recording has not both.
+    /// Agreement of a topic of dynamic points with the radial velocities, in at most `most` scans spread over the
+    /// drive; `None` unless the recording has both.
     ///
     /// # Errors
-    /// Where a scan cannot be read.
+    /// If a scan cannot be read.
     fn dynamic_agreement(&self, _most: usize) -> Result<Option<DynamicAgreement>> {
         Ok(None)
     }
 
-    /// The time of a number without an image, in seconds on the frames' clock.
+    /// The time of a frame number without an image, in seconds on the frames' clock.
     fn time_of(&self, _number: u64) -> Option<f64> {
         None
     }
@@ -147,7 +147,7 @@ pub trait Recording: fmt::Debug + Send + Sync {
     /// The camera's measured path.
     ///
     /// # Errors
-    /// Where it cannot be read; [`Error::NoPath`] where there is none.
+    /// If it cannot be read; [`Error::NoPath`] if there is none.
     fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
         Err(Error::NoPath {
             drive: dataset.name().to_owned(),
@@ -156,12 +156,12 @@ pub trait Recording: fmt::Debug + Send + Sync {
     }
 }
 
-/// What says what the camera is, and where.
+/// Where a calibration and its image size come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CalibrationPlace {
-    /// The file, or who else says it.
+    /// Where the calibration comes from.
     pub source: CalibrationSource,
-    /// The field that holds the image's size.
+    /// The field with the image size.
     pub field: &'static str,
 }
 
@@ -170,9 +170,9 @@ pub struct CalibrationPlace {
 pub struct CameraPath {
     /// Indices in [`Dataset::frames`].
     pub frames: Vec<usize>,
-    /// Their times, in seconds from the drive's first time stamp; empty where there are none.
+    /// Their times, in seconds from the drive's first time stamp; empty if they have no times.
     pub times_s: Vec<f64>,
-    /// The camera in a world that does not move. KITTI's has x east, y north, z up, and its origin at the
-    /// unit's first place; an RGB-D folder's is the recording's own.
+    /// Camera poses in a fixed world frame, in metres. KITTI's has x east, y north, z up, and its origin at the
+    /// unit's first position; an RGB-D folder's is the recording's own.
     pub world_from_cam: Vec<Se3>,
 }

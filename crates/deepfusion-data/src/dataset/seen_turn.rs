@@ -1,24 +1,25 @@
-//! How a vehicle turned, as its images show it.
+//! A vehicle's turns, estimated from its images.
 
 use super::warning::MotionWarning;
 use crate::MotionModel;
 
-/// How a vehicle turned from one image to the next, as these show it.
+/// A vehicle's turn from one image to the next, estimated from these images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeenTurn {
-    /// The earlier image's time, seconds on the frames' clock.
+    /// Time of the earlier image, seconds on the frames' clock.
     pub from_s: f64,
-    /// The later one's.
+    /// Time of the later image, seconds on the frames' clock.
     pub to_s: f64,
     /// Change of heading, radians, positive to the left.
     pub yaw_rad: f64,
-    /// Roll (the left side up) and pitch (the nose down) at the later image as seen from the earlier one, after the yaw, radians.
+    /// Roll (positive with the left side up) and pitch (positive with the nose down) at the later image relative to the earlier one, after
+    /// the yaw, radians.
     pub tilt_rad: [f64; 2],
 }
 
-/// The track with the turns' roll and pitch, and where it has no yaw rate with their yaw as well.
+/// The track with the turns' roll and pitch, and also their yaw if it has no yaw rate.
 pub(super) fn put_into(track: MotionModel, turns: &[SeenTurn], yaw_known: bool) -> MotionModel {
-    // A single pair that shows nothing is bridged, and no more.
+    // A gap of a single pair is bridged, but no more.
     let longest = turns.iter().map(|turn| turn.to_s - turn.from_s);
     let max_gap_s = 1.5 * longest.fold(0.0, f64::max);
     let samples = rates(turns);
@@ -31,16 +32,16 @@ pub(super) fn put_into(track: MotionModel, turns: &[SeenTurn], yaw_known: bool) 
     track.with_tilt_rates(&tilts, max_gap_s).into()
 }
 
-/// Rates of yaw, and of roll and pitch, whose integral over each turn's time is its angle: constant there, but for short ramps to the next.
+/// Rates of yaw, and of roll and pitch, whose integral over each turn's time is its angle: constant, except for short ramps to the next.
 fn rates(turns: &[SeenTurn]) -> Vec<(f64, (f64, [f64; 2]))> {
-    /// Share of a turn's time that a ramp takes.
+    /// Duration of a ramp as a fraction of a turn's time.
     const RAMP: f64 = 0.01;
     let ends = |(i, turn): (usize, &SeenTurn)| {
         let dt_s = turn.to_s - turn.from_s;
         let rate = (turn.yaw_rad / dt_s, turn.tilt_rad.map(|angle| angle / dt_s));
         let before = i.checked_sub(1).map(|before| turns[before].to_s);
         let after = turns.get(i + 1).map(|after| after.from_s);
-        // No ramp where no other turn follows at once: the track ends there.
+        // No ramp unless another turn follows immediately: the track ends here.
         let ramp = |neighbour: Option<f64>, end_s| {
             let follows = neighbour == Some(end_s);
             if follows { RAMP * dt_s } else { 0.0 }
@@ -51,7 +52,7 @@ fn rates(turns: &[SeenTurn]) -> Vec<(f64, (f64, [f64; 2]))> {
     turns.iter().enumerate().flat_map(ends).collect()
 }
 
-/// What is said of a recording of so many images whose turns were taken from them.
+/// The warning about a recording of `images` images whose turns were estimated from them.
 pub(super) fn warning(turns: &[SeenTurn], images: usize, yaw_known: bool) -> MotionWarning {
     let mut pitches: Vec<f64> = turns.iter().map(|turn| turn.tilt_rad[1].abs()).collect();
     pitches.sort_by(f64::total_cmp);
@@ -75,8 +76,8 @@ mod tests {
         VehicleTrack::new(&speeds).into()
     }
 
-    /// An hour of weaving that rolls and pitches, and always a little more to one side: between any two of its images the track turns as
-    /// was seen, at its end as at its start.
+    /// An hour of weaving with roll and pitch, and a constant drift to one side: between any two images the track turns as
+    /// observed, at its end as at its start.
     #[test]
     fn the_track_turns_as_was_seen() {
         let wave = |i: usize, k: f64| (k * i as f64).sin();
@@ -103,7 +104,7 @@ mod tests {
         }
     }
 
-    /// A pair that shows nothing is bridged; two are a gap in the yaw, and level where that is measured.
+    /// One missing pair is bridged. Two are a gap in the yaw, and count as level if the yaw is measured.
     #[test]
     fn what_was_not_seen_is_not_made_up() {
         let turn = |i: usize| SeenTurn {

@@ -1,4 +1,4 @@
-//! Which frames of a recording a split wants.
+//! Selects the frames of a recording that are in a split.
 
 use super::camera::Camera;
 use super::options::OpenOptions;
@@ -7,9 +7,9 @@ use crate::Error;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// The frames asked for.
+/// The frames to select.
 pub(crate) struct Selection<'a> {
-    /// Its frames, each with its place in the list; of two lines the first's.
+    /// The split, and the place of each of its frames in the list; of duplicate lines the first counts.
     split: Option<(&'a Split, HashMap<&'a SplitEntry, usize>)>,
 }
 
@@ -21,7 +21,7 @@ impl<'a> Selection<'a> {
         }
     }
 
-    /// Of a drive of a kind the frames asked for, as indices into `numbers`, each with its place among the split's frames where it has one there.
+    /// The frames to select from a drive, as indices into `numbers`, each with its place among the split's frames if it has one.
     pub(crate) fn of(
         &self,
         folder: &str,

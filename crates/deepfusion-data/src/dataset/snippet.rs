@@ -1,21 +1,21 @@
-//! Training samples: a frame, its neighbours, and how the camera moved between them.
+//! Training samples: a frame, its neighbours, and the camera's motion between them.
 
 use super::ego::NoMotion;
 use crate::{Dataset, EgoMotion, Error, Result};
 use std::collections::{HashMap, HashSet};
 
-/// A neighbour of a target.
+/// A neighbour of a target frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Source {
-    /// Its number less the target's: −1, +1.
+    /// Its number minus the target's, such as −1 or +1.
     pub offset: i32,
     /// Its index in [`Dataset::frames`].
     pub frame: usize,
-    /// The camera's motion between the two.
+    /// The camera's motion between the target and this frame.
     pub motion: EgoMotion,
 }
 
-/// A training sample: one target and its sources, in the order of the offsets asked for.
+/// A training sample: one target and its sources, in the order of the requested offsets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snippet {
     /// The target's index in [`Dataset::frames`].
@@ -25,23 +25,23 @@ pub struct Snippet {
 }
 
 impl Dataset {
-    /// The snippets of the selected frames that have every neighbour in `offsets`, in order of their
-    /// numbers: consecutive numbers, real time stamps, ego-motion known, and a mean speed of at least
-    /// `min_speed_mps` in every pair. `[1]` makes the two-frame sample (t, t + 1).
+    /// The snippets of the selected frames that have every neighbour in `offsets`, ordered by number. Each
+    /// snippet has consecutive numbers, valid time stamps, known ego-motion, and a mean speed of at least
+    /// `min_speed_mps` in every pair. `[1]` gives the two-frame sample (t, t + 1).
     ///
     /// # Errors
     /// [`Error::Offsets`]; [`Error::Missing`] or [`Error::NoTrack`] without times, speeds or the camera's
-    /// place on the car; and where none is left [`Error::OneFrame`], [`Error::Standing`] or [`Error::NoPairs`].
+    /// mount; and, if no snippet is left, [`Error::OneFrame`], [`Error::Standing`] or [`Error::NoPairs`].
     pub fn snippets(&self, offsets: &[i32], min_speed_mps: f64) -> Result<Vec<Snippet>> {
         self.snippets_apart(offsets, 0.0, min_speed_mps)
     }
 
-    /// As [`Self::snippets`], where an offset counts in steps of at least `frame_distance_m` metres that the camera
-    /// moved: the source of offset n is the first frame at least |n| away, and at least |n| × `frame_distance_m`
-    /// metres. One frame of a slow drive differs from the next by less than a pixel; 0 counts frames alone.
+    /// Like [`Self::snippets`], but an offset counts steps of at least `frame_distance_m` metres of camera motion: the
+    /// source at offset n is the first frame that is at least |n| frames and |n| × `frame_distance_m` metres away. This is
+    /// for slow drives, whose consecutive frames differ by less than a pixel. With 0 only frames are counted.
     ///
     /// # Errors
-    /// As [`Self::snippets`].
+    /// Those of [`Self::snippets`].
     pub fn snippets_apart(
         &self,
         offsets: &[i32],
@@ -89,12 +89,12 @@ impl Dataset {
                             continue 'targets;
                         }
                     };
-                    // No larger step makes a distance of NaN or infinity.
+                    // A larger step does not help if the distance is NaN or infinite.
                     if !motion.distance_m.is_finite() {
                         no_motion += 1;
                         continue 'targets;
                     }
-                    // A pair that is too slow is dropped below, so nobody waits for a car that stands.
+                    // A pair that is too slow is dropped below, so do not search on while the vehicle stands still.
                     if motion.distance_m >= least_m || motion.speed_mps < min_speed_mps {
                         break Source {
                             offset,
@@ -140,9 +140,9 @@ impl Dataset {
     }
 }
 
-/// Splits one drive's snippets, in order, into those to train on and the last `fraction` to validate
-/// on. A training snippet that shares a frame with a validation snippet is left out, so that the
-/// validation frames are unseen. With a single snippet there is nothing to hold out.
+/// Splits one drive's snippets, in order, into those for training and the last `fraction` for
+/// validation. Training snippets that share a frame with a validation snippet are left out, so that the
+/// validation frames are unseen. A single snippet is used for training.
 #[must_use]
 pub fn hold_out(mut snippets: Vec<Snippet>, fraction: f64) -> (Vec<Snippet>, Vec<Snippet>) {
     let held = (snippets.len() as f64 * fraction.clamp(0.0, 1.0)).ceil() as usize;
@@ -155,7 +155,7 @@ pub fn hold_out(mut snippets: Vec<Snippet>, fraction: f64) -> (Vec<Snippet>, Vec
     };
     let seen: HashSet<usize> = validation.iter().flat_map(frames).collect();
     let shares = |s: &Snippet| frames(s).iter().any(|f| seen.contains(f));
-    // A drive so short that nothing would be left keeps what it has.
+    // If the drive is so short that nothing would be left for training, keep the snippets that share frames.
     if snippets.iter().any(|s| !shares(s)) {
         snippets.retain(|s| !shares(s));
     }

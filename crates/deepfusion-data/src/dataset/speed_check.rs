@@ -1,10 +1,10 @@
-//! Whether the speeds fit what the images show: km/h taken for m/s makes every depth 3.6 times too
-//! large, and nothing in training would notice.
+//! Checks whether the speeds fit the images: km/h mistaken for m/s make every depth 3.6 times too
+//! large, and training would not detect it.
 //!
 //! The road is a plane at the camera's height. Two frames show its motion in units of that height:
 //! the homography of the plane n·X = h between them is K (R + t nᵀ / h) K⁻¹, so a known t gives h. A
-//! sweep over h finds the plane that best carries the earlier image onto the later one. A car's camera
-//! is 0.9 to 2.6 m above the road; a height outside says that t, and so the speed, is wrong by as much.
+//! sweep over h finds the plane that best warps the earlier image onto the later one. A car's camera
+//! is 0.9 to 2.6 m above the road. A height outside this range means that t, and so the speed, is wrong by the same factor.
 
 use super::snippet::Snippet;
 use crate::{Dataset, Result, resize_rgb};
@@ -19,25 +19,25 @@ use rayon::prelude::*;
 use std::fmt;
 use std::sync::Arc;
 
-/// Heights that a camera on a road vehicle can have, in metres.
+/// Plausible heights of a camera on a road vehicle, in metres.
 pub const PLAUSIBLE_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.9..=2.6;
-/// Width of the images compared, in pixels, and how many pairs.
+/// Width of the images compared, in pixels, and number of pairs.
 const WIDTH: u32 = 240;
 const MAX_PAIRS: usize = 24;
-/// Camera height of a usual car, to name the factor of a wrong unit.
+/// Camera height of a typical car, for the factor of a wrong unit.
 const USUAL_HEIGHT_M: f64 = 1.65;
 
-/// Speeds that the images contradict.
+/// The warning about speeds that contradict the images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedWarning {
-    /// How high above the road the camera would have to be, in metres.
+    /// Camera height above the road that would explain the images, in metres.
     pub implied_height_m: f64,
-    /// How many pairs of frames were compared.
+    /// Number of pairs of frames compared.
     pub pairs: usize,
 }
 
 impl SpeedWarning {
-    /// A warning if a camera that high cannot be on a car.
+    /// A warning if a camera on a car cannot have this height.
     #[must_use]
     pub fn of_height(implied_height_m: f64, pairs: usize) -> Option<Self> {
         (!PLAUSIBLE_HEIGHT_M.contains(&implied_height_m)).then_some(Self {
@@ -46,7 +46,7 @@ impl SpeedWarning {
         })
     }
 
-    /// The unit the speeds seem to be in, if one explains the height.
+    /// The likely unit of the speeds, if one explains the height.
     #[must_use]
     pub fn likely_unit(&self) -> Option<&'static str> {
         let factor = self.implied_height_m / USUAL_HEIGHT_M;
@@ -65,15 +65,15 @@ impl fmt::Display for SpeedWarning {
         if h > SWEEP_M.1 / SWEEP_RATIO.powi(2) {
             return write!(
                 f,
-                "the speeds say the car drives, but the road hardly moves in the images ({})",
+                "according to the speeds the vehicle drives, but the road hardly moves in the images ({})",
                 count_of(self.pairs, "pair")
             );
         }
         let (low, high) = (PLAUSIBLE_HEIGHT_M.start(), PLAUSIBLE_HEIGHT_M.end());
         write!(
             f,
-            "the speeds do not fit the images: the road's motion would put the camera {h:.1} m above it \
-             ({}; cars have it at {low} to {high} m), so depths would come out about {:.1} times ",
+            "the speeds do not fit the images: according to the road's motion, the camera would be {h:.1} m above it \
+             ({}; expected {low} to {high} m), so depths would be about {:.1} times ",
             count_of(self.pairs, "pair"),
             if h > *high {
                 h / USUAL_HEIGHT_M
@@ -89,21 +89,21 @@ impl fmt::Display for SpeedWarning {
     }
 }
 
-/// Compares the motion of the road in a sample of the drive's images with its speeds. `None` where
-/// they fit, where the images do not tell (no texture, no road), and where no yaw rate was recorded.
+/// Compares the motion of the road in a sample of the drive's images with its speeds. `None` if they
+/// fit, if the images are inconclusive (no texture, no road), or if no yaw rate was recorded.
 ///
 /// # Errors
-/// As [`Dataset::snippets`] and [`Dataset::load_image`].
+/// Those of [`Dataset::snippets`] and [`Dataset::load_image`].
 pub fn speed_unit_warning(dataset: &Dataset) -> Result<Option<SpeedWarning>> {
     let seen = road_camera_height(dataset)?;
     Ok(seen.and_then(|(height_m, pairs)| SpeedWarning::of_height(height_m, pairs)))
 }
 
-/// How high above the road the camera is by the motion of the road in the images and the drive's speeds, in metres, and
-/// by how many pairs of frames; `None` where the images do not tell.
+/// The camera's height above the road in metres, computed from the road's motion in the images and the drive's speeds, and
+/// the number of pairs of frames used; `None` if the images are inconclusive.
 ///
 /// # Errors
-/// As [`speed_unit_warning`].
+/// Those of [`speed_unit_warning`].
 pub fn road_camera_height(dataset: &Dataset) -> Result<Option<(f64, usize)>> {
     let snippets = sample(dataset.snippets(&[-1], 0.5)?);
     let Some(cam_from_vehicle) = dataset.cam_from_vehicle() else {
@@ -121,7 +121,7 @@ pub fn road_camera_height(dataset: &Dataset) -> Result<Option<(f64, usize)>> {
             earlier: texture(&earlier),
             later: texture(&later),
             intrinsics: k.resized(WIDTH, height),
-            // Pairs stand alone here: no acceleration is known.
+            // The pairs are independent here, so no acceleration is known.
             seconds: f64::NAN,
             earlier_from_later,
             down_in_cam,
@@ -152,7 +152,7 @@ pub fn grey_image(image: &RgbImage, width: u32, height: u32) -> GreyImage {
     }
 }
 
-/// At most [`MAX_PAIRS`] snippets, evenly over the faster half of the drive, where the road moves most.
+/// At most [`MAX_PAIRS`] snippets, spread evenly over the faster half of the drive, in which the road moves most.
 fn sample(mut snippets: Vec<Snippet>) -> Vec<Snippet> {
     let distance = |s: &Snippet| s.sources[0].motion.distance_m;
     let mut distances: Vec<f64> = snippets.iter().map(distance).collect();

@@ -1,4 +1,4 @@
-//! The field's split files: lists of frames, one a line; or of kinds of drives.
+//! Split files: lists of frames or scenarios, one per line.
 
 use super::camera::Camera;
 use crate::{Error, Result, SplitProblem};
@@ -7,29 +7,29 @@ use std::path::{Path, PathBuf};
 /// A list of frames, in the file's order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Split {
-    /// The file it came from.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Its lines that name a frame.
+    /// The lines that name a frame.
     pub entries: Vec<SplitEntry>,
-    /// Its lines that name a kind of drive, such as `garage`: every frame of such drives.
+    /// The scenarios that are named, such as `garage`: they select every frame of such drives.
     pub scenarios: Vec<String>,
 }
 
 /// One line of a split file, `folder index side`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct SplitEntry {
-    /// `<date>/<drive>`, or whatever the drive's [`crate::Dataset::split_name`] is; a number without leading zeros.
+    /// The drive's [`crate::Dataset::split_name`], such as `<date>/<drive>`; a number has no leading zeros.
     pub folder: String,
     /// The frame's number.
     pub frame: u64,
-    /// `l` is camera 2, `r` is camera 3; without a side, camera 2.
+    /// The camera: 2 for `l` or no side, 3 for `r`.
     pub camera: Camera,
 }
 
 impl Split {
-    /// Reads lines like `2011_09_26/2011_09_26_drive_0009_sync 0000000016 l`; the index may be padded
-    /// with zeros or not, empty lines are skipped. A line `scenario = garage` stands for every frame of the drives whose
-    /// [`crate::Dataset::scenario`] that is.
+    /// Reads lines like `2011_09_26/2011_09_26_drive_0009_sync 0000000016 l`. The index may be padded
+    /// with zeros. Empty lines are skipped. A line `scenario = garage` selects every frame of the drives with that
+    /// [`crate::Dataset::scenario`].
     ///
     /// # Errors
     /// [`Error::File`], or [`Error::Split`] with the number of a bad line.
@@ -64,13 +64,13 @@ impl Split {
         })
     }
 
-    /// How many lines it has.
+    /// Number of frames and scenarios in the split.
     #[must_use]
     pub fn len(&self) -> usize {
         self.entries.len() + self.scenarios.len()
     }
 
-    /// Whether it names nothing; one that was read names something.
+    /// Whether the split is empty; one that was read from a file never is.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -87,7 +87,8 @@ impl std::fmt::Display for SplitEntry {
     }
 }
 
-/// A drive's name in split files. The odometry task's lists name sequence `09` as `9`: names that are numbers have no leading zeros.
+/// A drive's name in split files. Names that are numbers lose leading zeros, because the lists for KITTI odometry write sequence `09` as
+/// `9`.
 pub(crate) fn drive_name(name: &str) -> String {
     let number = !name.is_empty() && name.bytes().all(|b| b.is_ascii_digit());
     match name.trim_start_matches('0') {
@@ -97,7 +98,7 @@ pub(crate) fn drive_name(name: &str) -> String {
     }
 }
 
-/// The name in `scenario = garage`.
+/// The name in a line like `scenario = garage`.
 fn scenario(line: &str) -> Option<&str> {
     let (key, name) = line.split_once('=')?;
     let name = name.trim().trim_matches('"');

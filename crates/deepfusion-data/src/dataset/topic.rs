@@ -1,10 +1,10 @@
-//! Which topic of a bag is for what, where a caller says it.
+//! Topics of a bag named by a caller, with their roles.
 
 use deepfusion_hint::Hint;
 use std::fmt;
 use std::str::FromStr;
 
-/// What a topic of a bag is read for.
+/// The role for which a bag's topic is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum TopicRole {
     /// The camera's images.
@@ -13,7 +13,7 @@ pub enum TopicRole {
     CameraInfo,
     /// The LiDAR's scans.
     Lidar,
-    /// Those points of the scans that move.
+    /// The dynamic points of the scans.
     Dynamic,
     /// The inertial unit.
     Imu,
@@ -23,12 +23,12 @@ pub enum TopicRole {
     Steering,
     /// CAN frames.
     Can,
-    /// The exact motion, for evaluation alone.
+    /// The exact motion, only for evaluation.
     Truth,
 }
 
 impl TopicRole {
-    /// All of them.
+    /// All roles.
     pub const ALL: [Self; 9] = [
         Self::Image,
         Self::CameraInfo,
@@ -41,7 +41,7 @@ impl TopicRole {
         Self::Truth,
     ];
 
-    /// Its name, which is its key in `[topics]` of the file beside a bag.
+    /// The role's name, which is also its key in `[topics]` of the file beside a bag.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -57,8 +57,8 @@ impl TopicRole {
         }
     }
 
-    /// Whether a bag is read without it, too: then [`NamedTopic::NONE`] may stand for its topic. There are no frames without images, and CAN
-    /// frames are read only where signals of theirs are asked for.
+    /// Whether a bag can be read without a topic for this role, so that [`NamedTopic::NONE`] is allowed. Images are required, and CAN
+    /// frames are only read if signals from them are named.
     #[must_use]
     pub fn is_optional(self) -> bool {
         !matches!(self, Self::Image | Self::Can)
@@ -71,17 +71,17 @@ impl fmt::Display for TopicRole {
     }
 }
 
-/// A topic and what it is read for, written `speed=/gps/fix`; `imu=none` where a bag has such topics, and none is to be read.
+/// A topic and its role, written `speed=/gps/fix`, or `imu=none` to read no topic for a role.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedTopic {
-    /// What for.
+    /// The topic's role.
     pub role: TopicRole,
-    /// The topic's whole name, or [`Self::NONE`].
+    /// The topic's full name, or [`Self::NONE`].
     pub topic: String,
 }
 
 impl NamedTopic {
-    /// In place of a topic's name: none is read for the role, which must be an [optional](TopicRole::is_optional) one.
+    /// Instead of a topic's name: read none for the role, which must be [optional](TopicRole::is_optional).
     pub const NONE: &'static str = "none";
 }
 
@@ -91,20 +91,20 @@ impl fmt::Display for NamedTopic {
     }
 }
 
-/// Why a text names no topic.
+/// Why a text is not a topic with its role.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoNamedTopic {
-    /// It is not written as one.
+    /// The text has the wrong form.
     #[error("expected ROLE=NAME, such as image=/camera/front/image_raw")]
     Shape,
-    /// Nothing is read for such a role.
-    #[error("`{text}` is no role: {} are", TopicRole::ALL.map(TopicRole::name).join(", "))]
+    /// The role is unknown.
+    #[error("unknown role `{text}`, expected one of {}", TopicRole::ALL.map(TopicRole::name).join(", "))]
     Role {
-        /// What stands for the role.
+        /// The text in place of the role.
         text: String,
     },
-    /// The name is empty.
+    /// The topic's name is empty.
     #[error("no topic is named for {role}")]
     NoName {
         /// The role.
@@ -115,10 +115,10 @@ pub enum NoNamedTopic {
 impl Hint for NoNamedTopic {
     fn hint(&self) -> Option<String> {
         match self {
-            // These messages say what is expected.
+            // The messages already say what is expected.
             Self::Shape | Self::Role { .. } => None,
             Self::NoName { role } => Some(format!(
-                "write the topic's whole name after the equals sign, such as {role}=/a/b"
+                "write the topic's full name after the equals sign, such as {role}=/a/b"
             )),
         }
     }
@@ -156,7 +156,10 @@ mod tests {
         }
         for (text, why) in [
             ("/camera", "ROLE=NAME"),
-            ("picture=/camera", "`picture` is no role: image,"),
+            (
+                "picture=/camera",
+                "unknown role `picture`, expected one of image,",
+            ),
             ("image= ", "no topic is named for image"),
         ] {
             let error = text.parse::<NamedTopic>().unwrap_err().to_string();

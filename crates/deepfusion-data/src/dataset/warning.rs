@@ -1,4 +1,4 @@
-//! What of a recording was taken for granted, looks odd or cannot be read, though it was opened.
+//! Warnings about a recording that was opened: assumptions, oddities and unreadable parts.
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -15,35 +15,35 @@ pub use self::motion::MotionWarning;
 pub use self::mount::{MountWarning, NotByFrames};
 pub use self::times::TimesWarning;
 
-/// What of a recording was taken for granted, looks odd or cannot be read, though it was opened.
+/// A warning about a recording that was opened: an assumption, an oddity or an unreadable part.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataWarning {
-    /// The camera and its lens.
+    /// About the camera and its lens.
     #[error(transparent)]
     Camera(#[from] CameraWarning),
-    /// Where the sensors are on the vehicle.
+    /// About the sensors' mounts on the vehicle.
     #[error(transparent)]
     Mount(#[from] MountWarning),
-    /// When something was measured.
+    /// About times.
     #[error(transparent)]
     Times(#[from] TimesWarning),
-    /// The vehicle's speeds and turns.
+    /// About the vehicle's speeds and turns.
     #[error(transparent)]
     Motion(#[from] MotionWarning),
-    /// What is left out, is not there or cannot be read.
+    /// About what is left out, missing or unreadable.
     #[error(transparent)]
     Incomplete(#[from] IncompleteWarning),
     /// A video's frames are decoded into the user's cache folder.
     #[error(
-        "nothing can be written beside the video: its decoded frames are kept in {} (cache in dataset.toml names another folder)",
+        "the video's folder is not writable: decoded frames are kept in {} (set cache in dataset.toml for another folder)",
         folder.display()
     )]
     FramesElsewhere {
-        /// Where they are kept.
+        /// Path of that cache folder.
         folder: PathBuf,
     },
-    /// What the layout of another crate says, in a sentence ([`crate::Recording`] is open).
+    /// A warning of a layout from another crate, in a sentence (anyone can implement [`crate::Recording`]).
     #[error("{0}")]
     Other(Cow<'static, str>),
 }
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
     use deepfusion_rosbag::SourceDamage;
 
-    /// One of each kind: what a kind says itself is tested beside it.
+    /// One of each kind; all messages of a kind are tested in its own file.
     #[test]
     fn a_warning_says_what_its_kind_says() {
         let ends_early = SourceDamage::new(std::io::Error::other("it ends early"));
@@ -69,12 +69,12 @@ mod tests {
             DataWarning::Other("its gyroscope was warm".into()),
         ];
         let said = [
-            "the lens' distortion is taken out of the images; fx, fy, cx, cy are those of the result",
-            "nothing says where the LiDAR is (cam_from_lidar): its scans give no ground truth",
+            "the images are corrected for lens distortion; fx, fy, cx, cy are those of the corrected images",
+            "the LiDAR's mount is not given (cam_from_lidar): its scans give no ground truth",
             "the video has no time stamps: set fps in dataset.toml",
-            "course.csv: not read, as it has no column course_rate_radps",
+            "course.csv: not read, since it has no column course_rate_radps",
             "the bag is damaged: it ends early",
-            "nothing can be written beside the video: its decoded frames are kept in frames (cache in dataset.toml names another folder)",
+            "the video's folder is not writable: decoded frames are kept in frames (set cache in dataset.toml for another folder)",
             "its gyroscope was warm",
         ];
         assert_eq!(warnings.map(|warning| warning.to_string()), said);

@@ -4,41 +4,41 @@ use crate::DatasetKind;
 use deepfusion_hint::count_of;
 use std::borrow::Cow;
 
-/// Why a recording that has streams has no images.
+/// Why a recording with other streams has no images.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoFramesReason {
-    /// The folder has no picture.
+    /// The folder has no image.
     #[error("no image (.png, .jpg, .jpeg)")]
     NoPicture,
     /// The RGB-D folder has no colour image.
     #[error("no frame-<number>.color.png or .jpg")]
     NoColour,
-    /// None of the files that the tables name is there.
-    #[error("not there, and no other image of {camera} that {table} names in {}", count_of(*scenes, "scene"))]
+    /// None of the image files listed in the tables exists.
+    #[error("not found, nor any other image of {camera} that {table} lists in {}", count_of(*scenes, "scene"))]
     NotUnpacked {
-        /// The camera.
+        /// Name of the camera.
         camera: &'static str,
-        /// The table.
+        /// Name of the table.
         table: &'static str,
-        /// How many scenes it has.
+        /// Number of scenes in the table.
         scenes: usize,
     },
-    /// Nothing that a video's decoding could begin with was recorded.
+    /// A topic of video packets has no key frame at which decoding could start.
     #[error(
-        "{topic} has {} and no key frame among them, with the parameters that decoding begins with",
+        "{topic} has {} and no key frame among them with the parameters at which decoding can start",
         count_of(*messages, "message")
     )]
     NoKeyFrame {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
-        /// How many messages it has.
+        /// Number of its messages.
         messages: u64,
     },
-    /// No topic holds images.
-    #[error("none of its topics holds images: {}", topics.join(", "))]
+    /// No topic has images.
+    #[error("none of its topics has images: {}", topics.join(", "))]
     NoImageTopic {
-        /// The topics that there are.
+        /// Names of all topics.
         topics: Vec<String>,
     },
 }
@@ -46,14 +46,14 @@ pub enum NoFramesReason {
 impl NoFramesReason {
     pub(super) fn hint(&self) -> &'static str {
         match self {
-            Self::NoPicture => "name the folder of the images in dataset.toml: images = \"…\"",
+            Self::NoPicture => "set images in dataset.toml to the folder of the images",
             Self::NoColour => "fetch the sequence's images",
-            Self::NotUnpacked { .. } => "unpack samples and sweeps beside the folder of the tables",
+            Self::NotUnpacked { .. } => "unpack samples and sweeps beside the folder of tables",
             Self::NoKeyFrame { .. } => {
-                "record for longer than from one key frame of the encoder to the next, or have it write them more often"
+                "record for longer than the encoder's interval between key frames, or shorten that interval"
             }
             Self::NoImageTopic { .. } => {
-                "topics.image in the file beside the bag names the camera's topic"
+                "set topics.image in the file beside the bag to the camera's topic"
             }
         }
     }
@@ -63,25 +63,25 @@ impl NoFramesReason {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoTrackReason {
-    /// Nothing measured speeds.
+    /// It has no measured speeds.
     #[error("it has no speeds")]
     NoSpeeds {
-        /// The recording's layout, which says where speeds come from.
+        /// The recording's layout, which determines where speeds come from.
         layout: DatasetKind,
     },
-    /// Poses would give speeds, but have no times.
+    /// Speeds could be computed from the poses, but these have no times.
     #[error("it has no speeds")]
     UntimedPoses,
-    /// Speeds are there, but the frames have no times.
-    #[error("nothing says when its frames were taken")]
+    /// It has speeds, but the frames have no times.
+    #[error("its frames have no times")]
     NoTimes,
-    /// No topic of a bag's holds speeds.
+    /// No topic of the bag has speeds.
     #[error(
-        "the bag has no speed of the vehicle (TwistStamped, TwistWithCovarianceStamped, Odometry, AckermannDriveStamped, NavSatFix, a \
+        "the bag has no speed of the vehicle (TwistStamped, TwistWithCovarianceStamped, Odometry, AckermannDriveStamped, NavSatFix or a \
          CAN signal)"
     )]
     NoSpeedTopic,
-    /// What the layout of another crate says ([`crate::Recording`] is open).
+    /// The reason of a layout from another crate (anyone can implement [`crate::Recording`]).
     #[error("{why}")]
     Other {
         /// What is missing.
@@ -96,46 +96,43 @@ impl NoTrackReason {
         match self {
             Self::NoSpeeds { layout } => speeds_from(*layout),
             Self::UntimedPoses => {
-                "speeds come from poses and times.txt: put the sequence's times there (data_odometry_calib.zip)"
+                "add the sequence's times.txt (from data_odometry_calib.zip): speeds come from poses and times"
             }
-            Self::NoTimes => "add frames.csv, timestamps.txt or fps in dataset.toml",
+            Self::NoTimes => "add frames.csv or timestamps.txt, or set fps in dataset.toml",
             Self::NoSpeedTopic => SPEED_TOPIC,
             Self::Other { hint, .. } => hint,
         }
     }
 }
 
-/// Where a bag's speeds come from.
-const SPEED_TOPIC: &str =
-    "topics.speed in the file beside the bag names its topic; [can] reads it from CAN frames";
+/// How to name a bag's source of speeds.
+const SPEED_TOPIC: &str = "set topics.speed in the file beside the bag to its topic, or read it from CAN frames with [can]";
 
-/// Where a layout's speeds come from.
+/// How to get speeds for a recording of this layout.
 fn speeds_from(layout: DatasetKind) -> &'static str {
     match layout {
         DatasetKind::Folder => {
-            "training needs speed.csv (time_s,speed_mps) beside the images; evaluation and prediction do not"
+            "add speed.csv (time_s,speed_mps) beside the images to train; evaluation and prediction need no speeds"
         }
         DatasetKind::Video => {
-            "training needs speed.csv (time_s,speed_mps) or a GPS track (.gpx, .nmea) beside the video; evaluation and prediction do not"
+            "add speed.csv (time_s,speed_mps) or a GPS track (.gpx, .nmea) beside the video to train; evaluation and prediction need no speeds"
         }
-        DatasetKind::Comma2k19 => "fetch processed_log/CAN/speed of the segment",
+        DatasetKind::Comma2k19 => "fetch the segment's processed_log/CAN/speed",
         DatasetKind::KittiOdometry => {
-            "speeds come from poses/<sequence>.txt, which KITTI publishes of sequences 00 to 10: train on those; \
-             evaluation and prediction need none"
+            "train on sequences 00 to 10: speeds come from poses/<sequence>.txt, which KITTI publishes only for those; evaluation and \
+             prediction need no speeds"
         }
         DatasetKind::Kitti360 => {
-            "speeds come from data_poses/<drive>/poses.txt and timestamps.txt: train on drives that have them; \
-             evaluation and prediction need none"
+            "train on drives that have data_poses/<drive>/poses.txt and timestamps.txt, from which speeds come; evaluation and prediction \
+             need no speeds"
         }
         DatasetKind::RgbD => {
-            "an RGB-D camera is carried by hand: evaluate and predict on it, train on a vehicle's recording"
+            "train on a vehicle's recording; an RGB-D camera is carried by hand, so only evaluate and predict on its recordings"
         }
         DatasetKind::NuScenes => {
-            "speeds come from ego_pose.json: unpack the data set's metadata again"
+            "unpack the data set's metadata again: speeds come from ego_pose.json"
         }
-        DatasetKind::KittiRaw => {
-            "fetch the drive's oxts folder: its speeds are what makes depth metric"
-        }
+        DatasetKind::KittiRaw => "fetch the drive's oxts folder: its speeds make depth metric",
         DatasetKind::Bag => SPEED_TOPIC,
         DatasetKind::Other => "give each frame its time and speed",
     }

@@ -1,4 +1,4 @@
-//! Why an array file cannot be used, or not be written.
+//! Why an array file cannot be read or written.
 
 use deepfusion_hint::count_of;
 use deepfusion_motion::comma;
@@ -9,10 +9,10 @@ use ndarray_npy::WriteNpzError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArrayProblem {
-    /// There are not as many values as pixels.
+    /// The number of values differs from the number of pixels.
     #[error("{0}")]
     Shape(#[source] ShapeError),
-    /// What the writer of array files says.
+    /// The array writer's error.
     #[error("{0}")]
     Write(#[source] Box<WriteNpzError>),
 }
@@ -21,33 +21,33 @@ pub enum ArrayProblem {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SegmentProblem {
-    /// It is no array of numbers.
+    /// The file is not an array of numbers.
     #[error("{0}")]
     Array(#[source] comma::ArrayProblem),
-    /// It has not as many values as times.
+    /// The array has more or fewer values than there are times.
     #[error("{}, but t has {times}", count_of(*values, "value"))]
     Length {
-        /// How many values it has.
+        /// Number of values in the array.
         values: usize,
-        /// How many times there are.
+        /// Number of times.
         times: usize,
     },
-    /// A number that cannot be a speed.
-    #[error("row {row}: {value} is no speed")]
+    /// A number is not a possible speed.
+    #[error("row {row}: {value} is not a speed")]
     NotASpeed {
         /// The row, counted from 0.
         row: usize,
-        /// What it holds.
+        /// The row's number.
         value: f64,
     },
-    /// A number that cannot be a time, or a time that goes back.
-    #[error("row {row}: {time_s} s after {last_s} s is no time")]
+    /// A number is not a possible time, or is before the time of the previous row.
+    #[error("row {row}: {time_s} s after {last_s} s is not a valid time")]
     NotATime {
         /// The row, counted from 0.
         row: usize,
-        /// What it holds, in seconds.
+        /// The row's number, in seconds.
         time_s: f64,
-        /// The time before it, in seconds.
+        /// The time in the previous row, in seconds.
         last_s: f64,
     },
 }

@@ -9,55 +9,55 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraProblem {
-    /// The file is none that a calibration tool writes.
+    /// The calibration file cannot be read.
     #[error(transparent)]
     File(#[from] CalibrationFileProblem),
-    /// The numbers make no camera of images of this size.
+    /// The intrinsics are implausible for images of this size.
     #[error(transparent)]
     Implausible(#[from] ImplausibleCamera),
-    /// Matrix and distortion do not fit each other.
+    /// Camera matrix and distortion do not fit each other.
     #[error(transparent)]
     Lens(#[from] NoLens),
-    /// A bag's camera, from whatever says it, cannot be used.
+    /// A bag's camera calibration cannot be used.
     #[error(transparent)]
     CameraInfo(#[from] CameraInfoProblem),
     /// A recording's images were taken with different focal lengths.
     #[error("EXIF says {said}, but {other_said} in {other}")]
     Zoomed {
-        /// By what this image says it.
+        /// This image's EXIF entry about its focal length.
         said: String,
-        /// By what the other one does.
+        /// The other image's entry.
         other_said: String,
-        /// The other one's name.
+        /// The other image's name.
         other: String,
     },
-    /// A calibration of raw images for a topic of rectified ones.
+    /// The calibration is for raw images, but the topic has rectified ones.
     #[error(
-        "it has a distortion, and the images are of a topic with `rect` in its name, rectified already"
+        "it has distortion coefficients, but the images are already rectified (their topic has `rect` in its name)"
     )]
     Rectified {
-        /// The file beside the bag, which names both.
+        /// Path of the file beside the bag, which names calibration and topic.
         config: PathBuf,
     },
-    /// The images of a scene have several cameras.
+    /// The images of a scene have several calibrations.
     #[error("{scene}: its images have several calibrations of {camera}")]
     Several {
-        /// The scene.
+        /// Name of the scene.
         scene: String,
         /// The camera's name.
         camera: &'static str,
     },
-    /// A GoPro's video does not say how wide its linear lens saw.
+    /// A GoPro's video was filmed through the linear lens with a zoom or crop of unknown field of view.
     #[error(
-        "filmed through the linear lens of a {model}, but zoomed or cut to another shape: how wide it sees is not known"
+        "filmed through the linear lens of a {model}, but zoomed or cropped: its field of view is unknown"
     )]
     LinearZoomed {
         /// The GoPro's model.
         model: String,
     },
-    /// A GoPro's video was filmed through a lens that is no pinhole's.
+    /// A GoPro's video was filmed through a lens that is not a pinhole camera's.
     #[error(
-        "the video says that its lens was \"{lens}\" on a {model}, which bends lines as no pinhole does"
+        "according to the video, it was filmed through the lens \"{lens}\" of a {model}, which bends lines, unlike a pinhole camera"
     )]
     BendsLines {
         /// The lens, as the GoPro's menu calls it.
@@ -76,53 +76,51 @@ impl CameraProblem {
     pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::File(problem) => problem.hint(),
-            Self::Implausible(_) => "give the calibration of these images, in their own pixels",
+            Self::Implausible(_) => "give the calibration of these images, in their pixels",
             Self::Lens(problem) => return problem.hint().unwrap_or_default(),
             Self::CameraInfo(CameraInfoProblem::NoProjection) => {
-                "name the raw images' topic (topics.image), or give the rectified camera as [camera], in the file beside the bag"
+                "set topics.image to the raw images' topic, or describe the rectified camera under [camera], in the file beside the bag"
             }
             Self::CameraInfo(_) => "calibrate the camera at the size of these images",
             Self::Zoomed { .. } => {
-                "a recording has one camera: keep apart what was taken with another lens or zoom, or give a calibration"
+                "keep images taken with different lenses or zooms in separate recordings, or give a calibration"
             }
             Self::Rectified { config } => {
                 return format!(
-                    "name the raw images' topic (topics.image), or give the rectified camera as [camera], both in {}",
+                    "set topics.image to the raw images' topic, or describe the rectified camera under [camera], in {}",
                     config.display()
                 );
             }
-            Self::Several { .. } => "a scene has one camera: leave it out",
+            Self::Several { .. } => "leave the scene out: it must have a single camera",
             Self::LinearZoomed { .. } => {
-                "calibrate the camera as it was zoomed; calibration.yaml beside the video then says it"
+                "calibrate the camera with the same zoom, and put calibration.yaml beside the video"
             }
             Self::BendsLines { .. } => {
                 let lens = Self::OTHER_LENS;
-                return format!("{lens}; calibration.yaml beside the video then says it");
+                return format!("{lens} (calibration.yaml beside the video)");
             }
         };
         text.to_owned()
     }
 }
 
-/// Why a bag's camera, from whatever says it, cannot be used.
+/// Why a bag's camera calibration cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraInfoProblem {
-    /// A model of lenses that is not known.
-    #[error(
-        "distortion_model {name} is not known: plumb_bob, rational_polynomial and equidistant are"
-    )]
+    /// The lens model is unknown.
+    #[error("distortion_model is {name}, expected plumb_bob, rational_polynomial or equidistant")]
     Model {
         /// Its name.
         name: String,
     },
-    /// Its images are rectified, and it says the camera of the others alone.
-    #[error("its images are rectified and its P is 0; K and D are of the images before that")]
+    /// The images are rectified, but only the camera of the raw ones is given.
+    #[error("its images are rectified, but P is 0; K and D only describe the raw images")]
     NoProjection,
-    /// The coefficients are no lens's.
+    /// The distortion coefficients are invalid.
     #[error(transparent)]
     Coefficients(#[from] NoDistortion),
-    /// Matrix and distortion do not fit each other.
+    /// Camera matrix and distortion do not fit each other.
     #[error(transparent)]
     Lens(#[from] NoLens),
 }
@@ -131,11 +129,11 @@ pub enum CameraInfoProblem {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoLens {
-    /// It shows one place twice.
+    /// The distortion maps two viewing rays to one pixel.
     #[error("the distortion folds over within the image: it does not fit this camera matrix")]
     FoldsOver,
-    /// What is left after it is no camera's.
-    #[error("after correction {0}")]
+    /// After correction, the intrinsics are implausible.
+    #[error("after correction: {0}")]
     Implausible(#[from] ImplausibleCamera),
 }
 

@@ -1,6 +1,6 @@
 //! What is wrong with the signals of CAN frames that `[can]` names.
 
-/// The highest identifiers of 11 and of 29 bits.
+/// The highest identifiers of 11 and 29 bits.
 pub(crate) const HIGHEST_STANDARD: u16 = 0x7ff;
 pub(crate) const HIGHEST_EXTENDED: u32 = 0x1fff_ffff;
 
@@ -8,12 +8,12 @@ pub(crate) const HIGHEST_EXTENDED: u32 = 0x1fff_ffff;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CanProblem {
-    /// The DBC file, or that it lacks a signal.
+    /// The DBC file cannot be used, or lacks a signal.
     #[error("can: {0}")]
     Dbc(#[source] Box<deepfusion_motion::Error>),
-    /// A signal by its name alone.
+    /// A signal is given only by its name, without a DBC file.
     #[error(
-        "can.{key} names {signal} of a DBC file, and can.dbc names none; without one, write the signal out: \
+        "can.{key} is the name {signal}, but can.dbc is missing; set can.dbc, or define the signal: \
          {key} = {{ id = …, layout = {{ start_bit = …, length = …, byte_order = … }} }}"
     )]
     NoDbc {
@@ -22,9 +22,9 @@ pub enum CanProblem {
         /// The signal's name.
         signal: String,
     },
-    /// An identifier of more than 11 bits.
+    /// A standard identifier has more than 11 bits.
     #[error(
-        "can.{key}: id is 0x{id:x}, expected at most 0x{HIGHEST_STANDARD:x}; one of 29 bits is written id = {{ extended = 0x{id:x} }}"
+        "can.{key}: id is 0x{id:x}, expected at most 0x{HIGHEST_STANDARD:x}; write an identifier of 29 bits as id = {{ extended = 0x{id:x} }}"
     )]
     StandardId {
         /// The key in `[can]`.
@@ -32,7 +32,7 @@ pub enum CanProblem {
         /// The identifier.
         id: u16,
     },
-    /// An identifier of more than 29 bits.
+    /// An extended identifier has more than 29 bits.
     #[error("can.{key}: id.extended is 0x{id:x}, expected at most 0x{HIGHEST_EXTENDED:x}")]
     ExtendedId {
         /// The key in `[can]`.
@@ -40,31 +40,29 @@ pub enum CanProblem {
         /// The identifier.
         id: u32,
     },
-    /// A signal that always has one value.
-    #[error("can.{key}: scale is 0, every value would be the same")]
+    /// A signal's scale is 0.
+    #[error("can.{key}: scale is 0, so every value would be the same")]
     NoScale {
         /// The key in `[can]`.
         key: &'static str,
     },
-    /// A signal that is in no frame.
+    /// A signal does not fit into a frame.
     #[error("{0}")]
     Layout(#[source] Box<deepfusion_motion::Error>),
-    /// The speed's unit, which its DBC file does not say.
+    /// The speed's unit is missing, also from the DBC file.
     #[error(
-        "can.speed_unit is missing, and the DBC file gives {signal} none that is known: \"m/s\", \"km/h\" or \"mph\""
+        "can.speed_unit is missing, and the DBC file has no known unit for {signal}; expected \"m/s\", \"km/h\" or \"mph\""
     )]
     UnknownSpeedUnit {
         /// The signal's name.
         signal: String,
     },
-    /// The speed's unit, which a signal that is written out has not.
-    #[error(
-        "can.speed_unit is missing, and can.speed has no unit of its own: \"m/s\", \"km/h\" or \"mph\""
-    )]
+    /// The unit of a speed signal defined in `[can]` is missing.
+    #[error("can.speed_unit is missing; expected \"m/s\", \"km/h\" or \"mph\"")]
     NoSpeedUnit,
-    /// The steering angle's unit.
+    /// The steering angle's unit is missing.
     #[error(
-        "can.steering_rad is missing: radians for one unit of the signal, 0.0174533 for degrees, 1.0 for radians"
+        "can.steering_rad is missing; expected the radians per unit of the signal (0.0174533 for degrees, 1.0 for radians)"
     )]
     NoSteeringUnit,
 }

@@ -5,13 +5,13 @@ use super::pose::PoseFileProblem;
 use deepfusion_hint::count_of;
 use std::fmt;
 
-/// What is measured, where its unit is in question.
+/// A measured quantity that needs a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Quantity {
     /// A speed.
     Speed,
-    /// A turn about the vertical axis by time.
+    /// A rate of turn about the vertical axis.
     YawRate,
     /// An acceleration.
     Acceleration,
@@ -31,64 +31,64 @@ impl fmt::Display for Quantity {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColumnsProblem {
-    /// A column that is needed is missing.
-    #[error("no column '{wanted}', there is: {}", found.join(", "))]
+    /// A required column is missing.
+    #[error("no column '{wanted}', only {}", found.join(", "))]
     NoColumn {
         /// Its name.
         wanted: String,
-        /// The columns that there are.
+        /// The names of the columns found.
         found: Vec<String>,
-        /// A header that would do.
+        /// An example of a valid header.
         example: &'static str,
     },
-    /// It ends after its header.
+    /// The table ends after its header.
     #[error("no row below the header")]
     NoRows,
-    /// Nothing says the unit of a column of times.
-    #[error("nothing says the unit of time of column {column}")]
+    /// The unit of a column of times is missing.
+    #[error("column {column}: no unit of time is given")]
     NoTimeUnit {
-        /// The column.
+        /// Name of the column.
         column: String,
     },
-    /// Nothing says the unit of a list of times.
-    #[error("nothing says the unit of its times")]
+    /// The unit of a list of times is missing.
+    #[error("the unit of its times is not given")]
     NoUnitOfTimes,
-    /// Nothing says the unit of a column of measured values.
-    #[error("nothing says the unit of column {column}")]
+    /// The unit of a column of measured values is missing.
+    #[error("column {column}: no unit of {quantity} is given")]
     NoUnit {
         /// What is measured.
         quantity: Quantity,
-        /// The column.
+        /// Name of the column.
         column: String,
     },
-    /// The unit is none that is known.
-    #[error("the unit of {quantity} '{unit}' is not known")]
+    /// The unit is unknown.
+    #[error("unknown unit of {quantity} '{unit}'")]
     UnknownUnit {
         /// What is measured.
         quantity: Quantity,
-        /// The unit.
+        /// The unit, as written.
         unit: String,
     },
-    /// Nothing says the unit of a folder of depth images.
-    #[error("nothing says the unit of the depth images")]
+    /// The unit of a folder of depth images is missing.
+    #[error("the unit of the depth images is not given")]
     NoDepthUnit,
-    /// There are more times than images, or fewer.
+    /// The number of times differs from the number of images.
     #[error("{}, but there {} {}", count_of(*times, "time"), is_or_are(*images), count_of(*images, "image"))]
     TimesOfImages {
-        /// How many times there are.
+        /// Number of times.
         times: usize,
-        /// How many images.
+        /// Number of images.
         images: usize,
     },
-    /// An array of a comma2k19 segment does not hold the values that it should.
+    /// An array of a comma2k19 segment has invalid values.
     #[error(transparent)]
     Segment(#[from] SegmentProblem),
-    /// A file of a pose does not hold one.
+    /// A pose file does not contain a pose.
     #[error(transparent)]
     Pose(#[from] PoseFileProblem),
 }
 
-/// The verb of a count.
+/// The verb for a count.
 fn is_or_are(count: usize) -> &'static str {
     if count == 1 { "is" } else { "are" }
 }
@@ -97,9 +97,11 @@ impl ColumnsProblem {
     pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::NoColumn { example, .. } => {
-                return format!("the first line names the columns, such as {example}");
+                return format!(
+                    "write the names of the columns in the first line, such as {example}"
+                );
             }
-            Self::NoRows => "record some",
+            Self::NoRows => "add a row for each measurement",
             Self::NoTimeUnit { .. } => {
                 "name the column time_s, time_ms, time_us or time_ns, or set time_unit in dataset.toml"
             }
@@ -107,11 +109,11 @@ impl ColumnsProblem {
             Self::UnknownUnit {
                 quantity: Quantity::Speed,
                 ..
-            } => "units are mps (m/s), kmh (km/h) and mph",
+            } => "use mps (m/s), kmh (km/h) or mph",
             Self::NoUnit { quantity, .. } | Self::UnknownUnit { quantity, .. } => match quantity {
                 Quantity::Speed => {
-                    "name the column speed_mps, speed_kmh or speed_mph, or set speed_unit in dataset.toml: \
-                     a wrong unit would scale every depth"
+                    "name the column speed_mps, speed_kmh or speed_mph, or set speed_unit in dataset.toml (a wrong unit would scale all \
+                     depths)"
                 }
                 Quantity::YawRate => {
                     "name the column yaw_rate_radps or yaw_rate_dps (positive to the left), or set yaw_rate_unit \
@@ -125,12 +127,13 @@ impl ColumnsProblem {
                 "set depth_unit_m in dataset.toml: 0.001 for millimetres, 0.00390625 for KITTI's 1/256 m"
             }
             Self::TimesOfImages { .. } => {
-                "it must have one line for each image, in order of their names; frames.csv names \
-                 each image"
+                "write one line per image, in the order of their names, or use frames.csv, which names each image"
             }
-            Self::Segment(_) => "fetch the segment again: it should be a NumPy array of numbers",
+            Self::Segment(_) => {
+                "fetch the segment again: the file should be a NumPy array of numbers"
+            }
             Self::Pose(_) => {
-                "a pose is world_from_cam in four rows of four numbers: repair it, or delete the file"
+                "repair the file (world_from_cam in four rows of four numbers), or delete it"
             }
         };
         text.to_owned()

@@ -1,19 +1,19 @@
-//! What is wrong with a `dataset.toml`, or with the file beside a bag.
+//! What is wrong with a `dataset.toml`, or with a bag's configuration file.
 
 use super::can::CanProblem;
 use deepfusion_motion::SPEED_SCALES;
 use std::fmt;
 use std::path::PathBuf;
 
-/// What is wrong with a `dataset.toml`, or with the file beside a bag.
+/// What is wrong with a `dataset.toml`, or with a bag's configuration file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfigProblem {
-    /// It is no TOML, or has keys or values that mean nothing here.
-    // No source: that would say the same again, with an empty line behind it.
+    /// The file is not TOML, or has unknown keys or invalid values.
+    // No source: it would print the same again, followed by an empty line.
     #[error("{}", .0.to_string().trim_end())]
     Unread(Box<toml::de::Error>),
-    /// What it is to hold has no TOML.
+    /// The contents cannot be written as TOML.
     #[error("{0}")]
     Unwritable(#[source] Box<toml::ser::Error>),
     /// A number is out of its range.
@@ -26,69 +26,69 @@ pub enum ConfigProblem {
         /// What it must be.
         expected: ExpectedValue,
     },
-    /// A list of numbers holds NaN or an infinite one.
-    #[error("{key} holds a number that is not finite")]
+    /// A list has a number that is NaN or infinite.
+    #[error("{key} has a number that is not finite")]
     NotFinite {
         /// The key.
         key: &'static str,
     },
-    /// A file or folder that it names is not there.
-    #[error("{key}: there is no {}", path.display())]
+    /// A named file or folder does not exist.
+    #[error("{key}: {} does not exist", path.display())]
     NoFile {
         /// The key.
         key: &'static str,
-        /// Where it should be.
+        /// Path of the missing file or folder.
         path: PathBuf,
     },
-    /// `intrinsics` and `hfov_deg` at once.
-    #[error("both intrinsics and hfov_deg say what the camera is: keep one")]
+    /// Both `intrinsics` and `hfov_deg` are set.
+    #[error("intrinsics and hfov_deg are both set: keep one of them")]
     IntrinsicsAndView,
-    /// `[camera]` and `calibration` at once.
-    #[error("[camera] and calibration both say what the camera is: keep one of them")]
+    /// Both `[camera]` and `calibration` are set.
+    #[error("[camera] and calibration are both set: keep one of them")]
     CameraAndCalibration,
-    /// A profile that does not come with this program.
-    #[error("profile: the only one there is is {}", known.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", "))]
+    /// The profile is unknown.
+    #[error("profile is unknown, expected {}", known.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", "))]
     NoProfile {
-        /// Those that do.
+        /// Names of the known profiles.
         known: Vec<&'static str>,
     },
-    /// A frame by its name, which no transform has.
+    /// A named frame is in none of the bag's transforms.
     #[error("frames.{key}: {name} is in no transform; {}", there_are(there))]
     NoFrame {
         /// The key in `[frames]`.
         key: &'static str,
-        /// The name.
+        /// Name of the frame.
         name: String,
-        /// The frames that there are.
+        /// Names of the frames in the transforms.
         there: Vec<String>,
     },
-    /// The unit of a bare number, which is the speed.
+    /// The speed's topic has plain numbers, and their unit is missing.
     #[error(
-        "vehicle.speed_unit is missing: {topic} is a bare number, \"m/s\", \"km/h\" or \"mph\""
+        "vehicle.speed_unit is missing: {topic} has plain numbers; expected \"m/s\", \"km/h\" or \"mph\""
     )]
     NoSpeedUnit {
-        /// The topic of the speed.
+        /// Name of the speed's topic.
         topic: String,
     },
-    /// The signals of CAN frames.
+    /// A signal of CAN frames cannot be used.
     #[error(transparent)]
     Can(#[from] CanProblem),
-    /// Several videos, and none is named.
-    #[error("{count} videos are there: name one, video = \"…\", or give its path")]
+    /// The folder has several videos, and none is named.
+    #[error("the folder has {count} videos: choose one with video = \"…\", or give its path")]
     SeveralVideos {
-        /// How many.
+        /// Number of videos.
         count: usize,
     },
-    /// Several GPS tracks, and none is named.
-    #[error("{count} tracks are there (.gpx, .nmea): name one, speed = \"…\"")]
+    /// The folder has several GPS tracks, and none is named.
+    #[error("the folder has {count} tracks (.gpx, .nmea): choose one with speed = \"…\"")]
     SeveralTracks {
-        /// How many.
+        /// Number of tracks.
         count: usize,
     },
-    /// Images and a video, and neither is named.
-    #[error("there are images and a video ({}): name one, images = \"…\" or video = \"…\"", video.display())]
+    /// The folder has images and a video, and neither is named.
+    #[error("the folder has images and a video ({}): choose with images = \"…\" or video = \"…\"", video.display())]
     ImagesAndVideo {
-        /// The video.
+        /// Path of the video.
         video: PathBuf,
     },
 }
@@ -99,11 +99,11 @@ impl From<toml::de::Error> for ConfigProblem {
     }
 }
 
-/// What a number of a `dataset.toml`, or of the file beside a bag, must be.
+/// What a number in a `dataset.toml`, or in a bag's configuration file, must be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum ExpectedValue {
-    /// What the key's name says, and finite.
+    /// A finite number; the key's name says of what.
     AsNamed,
     /// Above 0.
     Positive,
@@ -111,11 +111,11 @@ pub enum ExpectedValue {
     Time,
     /// A time above 0, at most this, in seconds.
     TimeUpTo(f64),
-    /// A gap that can be bridged: this at most, in seconds.
+    /// A gap that can be bridged: at most this, in seconds.
     GapUpTo(f64),
     /// An angle between these, in degrees.
     Between(f64, f64),
-    /// A true speed over the vehicle's.
+    /// A scale for speeds: true speed / measured speed.
     SpeedScale,
 }
 
@@ -123,12 +123,15 @@ impl fmt::Display for ExpectedValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::AsNamed => Ok(()),
-            Self::Positive => f.write_str(", it must be above 0"),
-            Self::Time => f.write_str(", it is a time in seconds"),
+            Self::Positive => f.write_str(", expected a number above 0"),
+            Self::Time => f.write_str(", expected a time in seconds"),
             Self::TimeUpTo(most) => write!(f, ", expected a time above 0 s, at most {most} s"),
-            Self::GapUpTo(most) => write!(f, ", at most {most} s can be bridged"),
+            Self::GapUpTo(most) => write!(f, ", but at most {most} s can be bridged"),
             Self::Between(least, most) => {
-                write!(f, ", it must be above {least} and below {most} degrees")
+                write!(
+                    f,
+                    ", expected more than {least} and less than {most} degrees"
+                )
             }
             Self::SpeedScale => {
                 let (least, most) = (SPEED_SCALES.start(), SPEED_SCALES.end());
@@ -143,7 +146,7 @@ impl fmt::Display for ExpectedValue {
 
 fn there_are(frames: &[String]) -> String {
     match frames {
-        [] => "the bag has no transforms of frames".to_owned(),
-        names => format!("there are {}", names.join(", ")),
+        [] => "the bag has no transforms".to_owned(),
+        names => format!("the bag's transforms have {}", names.join(", ")),
     }
 }

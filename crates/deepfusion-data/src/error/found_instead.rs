@@ -1,58 +1,58 @@
-//! What lies at a path where no recording of a known layout is.
+//! What was found at a path without a recording of a known layout.
 
 use deepfusion_hint::count_of;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
-/// What lies at a path that is no recording of a known layout.
+/// What was found at a path without a recording of a known layout.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FoundInstead {
     /// A part of a drive.
     PartOf {
-        /// The drive's folder.
+        /// Path of the drive's folder.
         drive: PathBuf,
     },
-    /// A ROS 2 bag, which this build does not read.
+    /// A ROS 2 bag, which this build cannot read.
     Ros2Bag,
     /// A single image.
     Image,
     /// An archive.
     Archive,
-    /// A file of another kind.
+    /// A file of an unknown kind.
     File,
     /// A folder without files.
     Empty,
-    /// Files of known kinds, without what says how to read them.
+    /// Files of known kinds, but not in a known layout.
     Files {
-        /// How many there are of each kind.
+        /// Number of files of each kind.
         kinds: BTreeMap<FileKind, usize>,
     },
-    /// A folder with nothing in it that is known.
+    /// A folder with only files of unknown kinds.
     Others {
-        /// Files in it and in its folders.
+        /// Number of files in it and in its folders.
         files: usize,
-        /// Folders in it.
+        /// Number of folders in it.
         folders: usize,
-        /// One of them, within the folder.
+        /// Path of one of them, relative to the folder.
         such_as: PathBuf,
     },
 }
 
-/// Kinds of files that recordings are made of.
+/// Kinds of files that recordings consist of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum FileKind {
-    /// `.bin`: scans, as a rule.
+    /// `.bin` files, usually LiDAR scans.
     Bin,
-    /// Bags of ROS 2.
+    /// ROS 2 bags.
     Ros2Bags,
-    /// Bags of ROS.
+    /// ROS 1 bags.
     RosBags,
-    /// PNG or JPEG.
+    /// PNG or JPEG images.
     Images,
-    /// Packed archives.
+    /// Archives, such as `.zip`.
     Archives,
     /// Videos.
     Videos,
@@ -72,7 +72,7 @@ impl FileKind {
 }
 
 impl FoundInstead {
-    /// Whether bags of ROS 2 are there.
+    /// Whether ROS 2 bags were found.
     #[must_use]
     pub fn has_ros2_bags(&self) -> bool {
         match self {
@@ -86,16 +86,16 @@ impl FoundInstead {
 impl fmt::Display for FoundInstead {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::PartOf { drive } => write!(f, "it lies within the drive {}", drive.display()),
+            Self::PartOf { drive } => write!(f, "it is part of the drive {}", drive.display()),
             Self::Ros2Bag => f.write_str("it is a ROS 2 bag"),
             Self::Image => f.write_str("it is a single image"),
-            Self::Archive => f.write_str("it is an archive that is still packed"),
+            Self::Archive => f.write_str("it is an archive that has not been unpacked"),
             Self::File => f.write_str("it is a file"),
             Self::Empty => f.write_str("it is empty"),
             Self::Files { kinds } => {
                 let list = kinds.iter().map(|(kind, n)| count_of(*n, kind.name()));
                 let list = list.collect::<Vec<_>>().join(", ");
-                write!(f, "it holds {list} and nothing that says how to read them")
+                write!(f, "it has {list}, but in no known layout")
             }
             Self::Others {
                 files,
@@ -103,7 +103,7 @@ impl fmt::Display for FoundInstead {
                 such_as,
             } => write!(
                 f,
-                "it holds {} and {} (such as {})",
+                "it has {} and {} (such as {})",
                 count_of(*files, "file"),
                 count_of(*folders, "folder"),
                 such_as.display()

@@ -1,37 +1,37 @@
-//! How the transforms of a bag's frames contradict each other.
+//! How the transforms between a bag's frames contradict each other.
 
 use crate::formats::Change;
 use std::path::PathBuf;
 
-/// How the transforms of a bag's frames contradict each other.
+/// How the transforms between a bag's frames contradict each other.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FramesProblem {
-    /// They say two places of a sensor.
+    /// They place a sensor in two different ways.
     #[error(
         "{mount} is ambiguous: the frames {} and {} are {} apart",
         ways[0].join(" → "), ways[1].join(" → "), Change { metres: *metres, radians: *radians }
     )]
     TwoWays {
-        /// The mount, by its key in the file beside the bag.
+        /// The mount's key in the file beside the bag.
         mount: &'static str,
-        /// The frames from the sensor to what it is mounted on, one way and the other.
+        /// The two chains of frames from the sensor to what it is mounted on.
         ways: Box<[Vec<String>; 2]>,
-        /// How far apart the two places are.
+        /// Distance between the two positions, in metres.
         metres: f64,
-        /// By how much they are turned against each other.
+        /// Angle between the two orientations, in radians.
         radians: f64,
-        /// The file beside the bag.
+        /// Path of the file beside the bag.
         config: PathBuf,
     },
-    /// Two frames that could be the vehicle's are not the same.
+    /// Two frames that could be the vehicle's differ.
     #[error("{first} and {other} could both be the vehicle's frame")]
     TwoVehicles {
-        /// One.
+        /// Name of one frame.
         first: String,
-        /// The other.
+        /// Name of the other frame.
         other: String,
-        /// The file beside the bag.
+        /// Path of the file beside the bag.
         config: PathBuf,
     },
 }
@@ -41,11 +41,11 @@ impl FramesProblem {
     pub(super) fn hint(&self) -> String {
         let (hint, config) = match self {
             Self::TwoWays { mount, config, .. } => (
-                format!("say it: [{mount}] translation = […], rotation = […]"),
+                format!("set [{mount}] translation = […], rotation = […]"),
                 config,
             ),
             Self::TwoVehicles { first, config, .. } => {
-                (format!("frames.vehicle = \"{first}\""), config)
+                (format!("set frames.vehicle = \"{first}\""), config)
             }
         };
         format!("{hint} (in {})", config.display())

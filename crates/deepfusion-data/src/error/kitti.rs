@@ -8,47 +8,47 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationProblem {
-    /// It is not there.
+    /// The file has no line for it.
     #[error("the file has no such line")]
     NoLine,
-    /// A word of it is not a number.
+    /// One of its words is not a number.
     #[error("'{text}' is not a number")]
     NotANumber {
         /// The word.
         text: String,
     },
-    /// A number of it is NaN or infinite.
+    /// One of its numbers is NaN or infinite.
     #[error("'{text}' is not finite")]
     NotFinite {
-        /// The number, as it is written.
+        /// The number, as written.
         text: String,
     },
     /// It has too many numbers, or too few.
     #[error("{}, expected {expected}", count_of(*found, "number"))]
     Length {
-        /// How many it has.
+        /// How many numbers it has.
         found: usize,
         /// How many it should have.
         expected: usize,
     },
-    /// A matrix that turns nothing, or mirrors it.
+    /// The matrix is not a rotation.
     #[error("is not a rotation")]
     NotARotation,
-    /// Rows of a motion whose matrix is no rotation.
+    /// The matrix of a transform is not a rotation.
     #[error("its matrix is not a rotation")]
     NotAMotion,
-    /// A projection that is no camera's.
+    /// A projection has implausible intrinsics.
     #[error(transparent)]
     Implausible(#[from] ImplausibleCamera),
-    /// A width or height that no image has.
+    /// A number is not a possible width or height.
     #[error("{value} is not a size in pixels")]
     NotASize {
-        /// What it says.
+        /// The number.
         value: f64,
     },
 }
 
-/// Where in an OXTS packet something is wrong.
+/// The part of an OXTS packet that is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum OxtsField {
@@ -59,7 +59,7 @@ pub enum OxtsField {
         /// Which it is, counted from 1.
         number: usize,
     },
-    /// All of it.
+    /// The whole packet.
     Packet,
 }
 
@@ -79,7 +79,7 @@ pub enum OxtsProblem {
     /// A value is not a number.
     #[error("'{text}' is not a number")]
     NotANumber {
-        /// What it is.
+        /// The value, as written.
         text: String,
     },
     /// A value is NaN or infinite.
@@ -91,7 +91,7 @@ pub enum OxtsProblem {
     /// It has too many values, or too few.
     #[error("{}, expected 30", count_of(*found, "value"))]
     Length {
-        /// How many it has.
+        /// How many values it has.
         found: usize,
     },
 }

@@ -1,33 +1,33 @@
-//! Why a line of a list cannot be used: of times, or of the frames of a split.
+//! Why a line of a time stamp file or of a split file cannot be used.
 
 use deepfusion_hint::count_of;
 
-/// Why a line of a file of times cannot be used. Of a long line that is no time it holds the beginning alone.
+/// Why a line of a time stamp file cannot be used. A long line is cut.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TimeStampProblem {
-    /// It is no date and time of day.
+    /// The line is not a date with a time of day.
     #[error("'{text}' is not a time stamp like 2011-09-26 13:04:32.345808896")]
     NotADate {
         /// The line.
         text: String,
     },
-    /// It is not a number of seconds.
+    /// The line is not a number of seconds.
     #[error("'{text}' is not a time in seconds")]
     NotSeconds {
         /// The line.
         text: String,
     },
-    /// It is neither.
+    /// The line is neither of these.
     #[error("'{text}' is not a time")]
     NotATime {
         /// The line.
         text: String,
     },
-    /// It does not come after the time above it.
+    /// The time is not after that of the previous line.
     #[error("'{text}' is not after the line above")]
     NotAfter {
-        /// The line, which may be cut where it is long.
+        /// The line.
         text: String,
     },
 }
@@ -36,19 +36,19 @@ pub enum TimeStampProblem {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SplitProblem {
-    /// It has more words than a frame's name, or one alone.
+    /// The line has too many words, or only one.
     #[error("{}, expected folder, index and side", count_of(*found, "word"))]
     Words {
-        /// How many.
+        /// Number of words.
         found: usize,
     },
-    /// Its second word is not a number.
+    /// The second word is not a number.
     #[error("index '{text}' is not a frame number")]
     Index {
         /// The word.
         text: String,
     },
-    /// Its third word is no side.
+    /// The third word is not a side.
     #[error("side '{text}', expected l or r")]
     Side {
         /// The word.

@@ -7,38 +7,38 @@ use image::ImageError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageProblem {
-    /// Its file.
+    /// The image file cannot be read.
     #[error(transparent)]
     File(#[from] deepfusion_images::ImageProblem),
-    /// It cannot be written in another format.
+    /// The image cannot be encoded in another format.
     #[error("{0}")]
     Unencodable(#[source] ImageError),
-    /// A picture where a recording's depth should be.
-    #[error("not a 16-bit grey PNG, which depth images are")]
+    /// The file is an image, but not a depth image.
+    #[error("not a depth image: expected a 16-bit grey PNG")]
     NotDepth,
-    /// A recording has no image of this number.
+    /// The recording has no image with this number.
     #[error("there is no image {0}")]
     NoImage(u64),
-    /// A message is no longer where it was.
+    /// A message is no longer where it was in the bag.
     #[error("{topic}: no message at {time}")]
     NoMessage {
-        /// Its topic.
+        /// Name of its topic.
         topic: String,
-        /// When it was recorded.
+        /// Time at which it was recorded.
         time: Time,
     },
-    /// A message holds fewer pixels than its size says.
-    #[error("{topic} at {time}: its pixels do not fill its size")]
+    /// A message has fewer pixels than its width and height require.
+    #[error("{topic} at {time}: fewer pixels than its width and height require")]
     TooFewPixels {
-        /// Its topic.
+        /// Name of its topic.
         topic: String,
-        /// When it was recorded.
+        /// Time at which it was recorded.
         time: Time,
     },
-    /// A topic of pictures and of a video's packets.
-    #[error("{topic}: some of its messages are pictures, others packets of a video")]
+    /// The topic has both single images and packets of a video.
+    #[error("{topic}: some of its messages are single images, others packets of a video")]
     Mixed {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
     },
 }

@@ -1,22 +1,22 @@
-//! Why a file of poses cannot be used, and where in it.
+//! Why a pose file cannot be used, and where in it.
 
 use deepfusion_hint::count_of;
 use std::fmt;
 
-/// Where in a line of a file of poses something is wrong.
+/// The part of a pose file's line that is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PoseField {
     /// The frame's number, which comes first.
     Frame,
-    /// One of its numbers, counted from 1.
+    /// One of its numbers.
     Value {
-        /// Which.
+        /// Which one, counted from 1.
         number: usize,
-        /// Of how many.
+        /// How many numbers there are.
         of: usize,
     },
-    /// All of them.
+    /// The whole pose.
     Pose,
 }
 
@@ -30,17 +30,17 @@ impl fmt::Display for PoseField {
     }
 }
 
-/// Why a line of a file of poses cannot be used.
+/// Why a line of a pose file cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseProblem {
-    /// A word is not a number, or it is NaN or infinite.
+    /// A word is not a number, or is NaN or infinite.
     #[error("'{text}' is not a finite number")]
     NotANumber {
         /// The word, or its beginning.
         text: String,
     },
-    /// It has too many numbers, or too few.
+    /// The line has too many numbers, or too few.
     #[error("{}, expected {expected}", count_of(*found, "number"))]
     Length {
         /// How many it has.
@@ -48,34 +48,34 @@ pub enum PoseProblem {
         /// How many it should have.
         expected: usize,
     },
-    /// It does not begin with a frame's number.
-    #[error("{value} is not a frame's number")]
+    /// The line does not begin with a frame number.
+    #[error("{value} is not a frame number")]
     NotAFrame {
-        /// With what it begins.
+        /// Its first number.
         value: f64,
     },
-    /// Its matrix turns nothing, or mirrors it.
+    /// The pose's matrix is not a rotation.
     #[error("its matrix is not a rotation")]
     NoRotation,
-    /// There is no line.
+    /// The file has no lines.
     #[error("the file is empty")]
     NoPose,
 }
 
-/// Why the file of an RGB-D frame's pose cannot be used.
+/// Why the pose file of an RGB-D frame cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseFileProblem {
     /// A word is not a number.
     #[error("a word is not a number")]
     NotANumber,
-    /// Its matrix is not whole.
+    /// The file has too many numbers, or too few.
     #[error("{}, expected 16", count_of(*found, "number"))]
     Length {
         /// How many numbers it has.
         found: usize,
     },
-    /// Its matrix turns nothing, or mirrors it.
+    /// The pose's matrix is not a rotation.
     #[error("its matrix is not a rotation")]
     NoRotation,
 }

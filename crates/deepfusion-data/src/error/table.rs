@@ -1,19 +1,19 @@
-//! Why a table cannot be used: of comma-separated values, or of JSON.
+//! Why a CSV or JSON table cannot be used.
 
 use deepfusion_hint::count_of;
 use std::fmt;
 
-/// Why a value of a table cannot be used.
+/// Why a value in a CSV table cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableProblem {
-    /// It is empty.
+    /// The cell is empty.
     #[error("empty, expected {expected}")]
     Empty {
         /// What it should be.
         expected: ExpectedCell,
     },
-    /// It is something else.
+    /// The value is not what is expected.
     #[error("'{text}' is not {expected}")]
     NotA {
         /// What it should be.
@@ -21,32 +21,32 @@ pub enum TableProblem {
         /// The value, or its beginning.
         text: String,
     },
-    /// It is a time that goes back.
+    /// The time is before that of the previous row.
     #[error("'{text}' is {seconds} s before the row above")]
     Earlier {
         /// The value.
         text: String,
-        /// By how much.
+        /// How much earlier it is, in seconds.
         seconds: f64,
     },
-    /// The row has another number of values than the header.
-    #[error("{}, the header has {header}", count_of(*found, "value"))]
+    /// The number of values in the row differs from that in the header.
+    #[error("{}, but the header has {header}", count_of(*found, "value"))]
     Length {
-        /// How many the row has.
+        /// How many values the row has.
         found: u64,
-        /// How many the header.
+        /// How many values the header has.
         header: u64,
     },
-    /// The row is no text.
+    /// The row is not UTF-8 text.
     #[error("not UTF-8 text")]
     NotText,
-    /// What else the reader of comma-separated tables does not understand.
+    /// Any other error of the CSV reader.
     #[error("{0}")]
     Csv(#[source] csv::Error),
 }
 
 impl TableProblem {
-    /// Of a value that is not what it should be; it is shown short, however long it is.
+    /// The problem of a value that is not as expected. Long values are cut.
     pub(crate) fn not(expected: ExpectedCell, word: &str) -> Self {
         match word.chars().take(40).collect::<String>() {
             text if text.is_empty() => Self::Empty { expected },
@@ -55,7 +55,7 @@ impl TableProblem {
     }
 }
 
-/// What a value of a table should be.
+/// What a value in a table should be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ExpectedCell {
@@ -63,7 +63,7 @@ pub enum ExpectedCell {
     Number,
     /// A time.
     Time,
-    /// The name of an image that is there.
+    /// The name of an existing image.
     Image,
 }
 
@@ -72,49 +72,49 @@ impl fmt::Display for ExpectedCell {
         f.write_str(match self {
             Self::Number => "a finite number",
             Self::Time => "a time",
-            Self::Image => "the name of an image that is there",
+            Self::Image => "the name of an existing image",
         })
     }
 }
 
-/// What is wrong with a table of JSON.
+/// What is wrong with a JSON table.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum JsonProblem {
-    /// A row is no JSON, or lacks a field, or has one of another type.
-    // No source: that would count the line from the row's first on.
+    /// A row is not JSON, lacks a field, or has a field of the wrong type.
+    // No source: its line numbers count from the row's first line.
     #[error("{}", without_place(.0))]
     Unread(serde_json::Error),
-    /// Something else than a row, between two of them.
-    #[error("'{}' is not expected here", found.escape_debug())]
+    /// An unexpected character between two rows.
+    #[error("unexpected '{}'", found.escape_debug())]
     Unexpected {
-        /// What is there.
+        /// The character.
         found: char,
     },
-    /// The file is not whole.
+    /// The file is truncated.
     #[error("the file ends within the table")]
     Ends,
-    /// It names a row that another table has not.
+    /// A row refers to one that the other table does not have.
     #[error("{table} has no row {token}")]
     NoRow {
-        /// The other table.
+        /// Name of the other table.
         table: &'static str,
         /// The row's token.
         token: String,
     },
     /// The recording has no such sensor.
-    #[error("no sensor is {name}")]
+    #[error("no sensor is called {name}")]
     NoSensor {
         /// The sensor's name.
         name: &'static str,
     },
-    /// A quaternion that is no rotation.
+    /// A quaternion is not a rotation.
     #[error("a quaternion of length {length:.3}, expected 1")]
     NotARotation {
         /// Its length.
         length: f64,
     },
-    /// A matrix that is no camera's.
+    /// A camera matrix does not have three rows.
     #[error("{}, expected the 3 of a camera matrix", count_of(*rows, "row"))]
     NotAMatrix {
         /// How many rows it has.
@@ -122,7 +122,7 @@ pub enum JsonProblem {
     },
 }
 
-/// What the parser says but for its place, which is counted from the row's beginning.
+/// The parser's message without the position, which counts from the row's beginning.
 fn without_place(error: &serde_json::Error) -> String {
     let text = error.to_string();
     text.split(" at line ").next().unwrap_or(&text).to_owned()

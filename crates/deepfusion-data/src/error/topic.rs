@@ -1,86 +1,86 @@
-//! Why a bag's topics are not what is needed.
+//! Why a bag's topics cannot be used.
 
 use crate::{NamedTopic, TopicRole};
 use deepfusion_rosbag::msg::Frame;
 use deepfusion_rosbag::{MessageError, RosMessage};
 use std::path::{Path, PathBuf};
 
-/// Why a bag's topics are not what is needed.
+/// Why a bag's topics cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TopicProblem {
-    /// A topic was named that is not there.
-    #[error("has no topic {name}")]
+    /// The named topic does not exist.
+    #[error("no topic {name}")]
     NoTopic {
-        /// What it was named for.
+        /// The role it was named for.
         role: TopicRole,
         /// Its name.
         name: String,
-        /// The topics that there are.
+        /// Names of the bag's topics.
         there: Vec<String>,
-        /// The file beside the bag, where that named it, and not the caller.
+        /// Path of the file beside the bag, if the topic was named there and not by the caller.
         config: Option<PathBuf>,
     },
-    /// A topic was named whose messages are of another type.
-    #[error("{name} holds {found}")]
+    /// The named topic has messages of the wrong type.
+    #[error("{name} has messages of the wrong type {found}")]
     OtherType {
-        /// What it was named for.
+        /// The role it was named for.
         role: TopicRole,
         /// Its name.
         name: String,
         /// Its type.
         found: String,
-        /// The types that can be read for it.
+        /// The types that can be read for this role.
         expected: Vec<String>,
-        /// The file beside the bag, where that named it, and not the caller.
+        /// Path of the file beside the bag, if the topic was named there and not by the caller.
         config: Option<PathBuf>,
     },
-    /// Several topics could be meant.
+    /// Several topics are possible for a role.
     #[error("{} topics could be the {role}: {}", topics.len(), topics.join(", "))]
     Several {
-        /// What for.
+        /// The role.
         role: TopicRole,
-        /// The topics.
+        /// Names of the topics.
         topics: Vec<String>,
-        /// The file beside the bag.
+        /// Path of the file beside the bag.
         config: PathBuf,
     },
-    /// A topic and a signal of CAN frames were named for one quantity.
-    #[error("topics.{role} (\"{name}\") and can.{role} both say where the {role} is")]
+    /// Both a topic and a CAN signal were named for one quantity.
+    #[error("topics.{role} (\"{name}\") and can.{role} are both set")]
     AndSignal {
         /// The quantity.
         role: TopicRole,
-        /// The topic.
+        /// Name of the topic.
         name: String,
     },
-    /// Signals of CAN frames were named, and there are no frames.
-    #[error("has no topic of {}, which [can] reads", Frame::TYPE)]
+    /// CAN signals were named, but the bag has no CAN frames.
+    #[error("no topic of {}, which [can] reads", Frame::TYPE)]
     NoCan {
-        /// The file beside the bag.
+        /// Path of the file beside the bag.
         config: PathBuf,
     },
-    /// A cloud lacks a field.
+    /// A point cloud lacks a field.
     #[error("{topic}: {source}")]
     Column {
-        /// Its topic.
+        /// Name of its topic.
         topic: String,
-        /// Which.
+        /// Which field is missing.
         source: MessageError,
     },
-    /// The points' own times are none of the cloud's.
-    #[error("{topic}: the times in field {field} are more than a second from the message's")]
+    /// The points' own times are too far from the message's.
+    #[error("{topic}: the times in field {field} differ from the message's by more than 1 s")]
     PointTimes {
-        /// The cloud's topic.
+        /// Name of the point cloud's topic.
         topic: String,
-        /// The field.
+        /// Name of the field.
         field: String,
     },
-    /// Points make no cloud.
+    /// A point cloud message cannot be read.
     #[error("{0}")]
     Cloud(#[source] MessageError),
 }
 
-/// What a topic's name must be, in the file that says it, or as the caller does.
+/// What a role's topic must be, with the place where it is set: the file beside the bag, or the caller.
 fn named_in(config: Option<&Path>, role: TopicRole, must: &str) -> String {
     match config {
         Some(config) => format!("topics.{role} {must} (in {})", config.display()),
@@ -129,21 +129,21 @@ impl TopicProblem {
             }
             Self::NoCan { config } => {
                 format!(
-                    "delete [can], or record the bus (in {})",
+                    "record the CAN bus, or delete [can] (in {})",
                     config.display()
                 )
             }
             Self::Column { .. } => {
-                "lidar.velocity_field names the field of the radial velocity, lidar.time_field that of the points' times; x, y and z must be there".into()
+                "set lidar.velocity_field to the field of the radial velocity and lidar.time_field to that of the points' times; x, y and z are required".into()
             }
             Self::PointTimes { .. } => {
-                "lidar.time_field names times in seconds or whole nanoseconds after the message's, or dates; without it all points count as measured then".into()
+                "set lidar.time_field to a field with seconds or whole nanoseconds after the message's time, or dates; without it, all points get the message's time".into()
             }
-            Self::Cloud(_) => "report this with the recording".into(),
+            Self::Cloud(_) => "report this as a bug, with the recording".into(),
         }
     }
 
-    /// Of several topics the first, which could be named.
+    /// The first of several possible topics.
     pub(crate) fn choice(&self) -> Option<NamedTopic> {
         match self {
             Self::Several { role, topics, .. } => topics.first().map(|topic| NamedTopic {

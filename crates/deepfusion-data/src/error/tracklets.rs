@@ -1,26 +1,26 @@
-//! What is wrong with a file of tracklets, and where.
+//! What is wrong with a tracklet file, and where.
 
 use deepfusion_hint::count_of;
 use std::fmt;
 
-/// Where in a file of tracklets something is wrong; all but bytes are counted from 0.
+/// The place in a tracklet file where something is wrong. Tracklets and poses are counted from 0.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TrackletPlace {
-    /// Where the text stops being XML, or tracklets.
+    /// The offset in bytes at which the text is not XML, or not tracklets.
     Byte(u64),
-    /// The list of them.
+    /// The list of tracklets.
     List {
-        /// An element of it.
+        /// The element of the list, if known.
         field: Option<String>,
     },
     /// A tracklet.
     Tracklet {
-        /// Which.
+        /// The tracklet's number.
         number: usize,
-        /// One of its poses.
+        /// The number of its pose, if a pose is wrong.
         pose: Option<usize>,
-        /// An element of either.
+        /// The element of the tracklet or pose, if known.
         field: Option<String>,
     },
 }
@@ -52,18 +52,18 @@ impl fmt::Display for TrackletPlace {
     }
 }
 
-/// What a file of tracklets has a count of.
+/// What a tracklet file counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TrackletPart {
     /// Labelled objects.
     Tracklets,
-    /// Places of one.
+    /// Poses of an object.
     Poses,
 }
 
 impl fmt::Display for TrackletPart {
-    /// One of them.
+    /// The singular.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Tracklets => "tracklet",
@@ -72,54 +72,54 @@ impl fmt::Display for TrackletPart {
     }
 }
 
-/// What is wrong with a file of tracklets.
+/// What is wrong with a tracklet file.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackletsProblem {
-    /// It is no XML.
+    /// The file is not XML.
     #[error("{0}")]
     Xml(#[source] Box<quick_xml::Error>),
-    /// It is not whole.
+    /// The file is truncated.
     #[error("ends within <{}>", within.join("><"))]
     Ends {
-        /// The elements that are open at its end, the outermost first.
+        /// The elements still open at its end, from the outermost to the innermost.
         within: Vec<String>,
     },
-    /// It is XML of something else.
-    #[error("has no <boost_serialization><tracklets><count>: it holds no tracklets")]
+    /// The file is XML, but not tracklets.
+    #[error("not a tracklet file: no <boost_serialization><tracklets><count>")]
     NoTracklets,
-    /// An element is not there.
-    #[error("has no <{element}>")]
+    /// An element is missing.
+    #[error("no <{element}>")]
     Lacks {
         /// Its name.
         element: &'static str,
     },
-    /// A text is no whole number.
+    /// A text is not a whole number.
     #[error("'{text}' is not a whole number")]
     NotACount {
         /// The text, or its beginning.
         text: String,
     },
-    /// A text is not a number, or it is NaN or infinite.
+    /// A text is not a number, or is NaN or infinite.
     #[error("'{text}' is not a finite number")]
     NotANumber {
         /// The text, or its beginning.
         text: String,
     },
-    /// A side of a box that cannot be a length.
+    /// A side of a box is not a possible length.
     #[error("{value} is not a length")]
     NotALength {
-        /// What is said, in metres.
+        /// The value, in metres.
         value: f64,
     },
-    /// There are more, or fewer, than is said.
-    #[error("{}, its count says {announced}", count_of(*found, &of.to_string()))]
+    /// The number of elements differs from the stated count.
+    #[error("{}, but <count> is {announced}", count_of(*found, &of.to_string()))]
     Count {
-        /// Of what.
+        /// What is counted.
         of: TrackletPart,
         /// How many there are.
         found: usize,
-        /// How many there should be.
+        /// The stated count.
         announced: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! A comma2k19 segment: `processed_log` and `global_pose` as NumPy arrays without an ending, `video.hevc`.
+//! Opens a comma2k19 segment: `processed_log` and `global_pose` as NumPy arrays without a file extension, and `video.hevc`.
 
 use super::shared::files::name_of;
 use super::shared::plain::PlainParts;
@@ -22,7 +22,7 @@ const VIDEO: &str = "video.hevc";
 const SPEED: &str = "processed_log/CAN/speed";
 const FRAME_TIMES: &str = "global_pose/frame_times";
 
-/// Streams beside the images: folder with `t`, kind.
+/// Streams other than the images: their folder, which contains `t`, and their kind.
 const STREAMS: [(&str, &str); 5] = [
     (SPEED, "speed"),
     ("processed_log/CAN/wheel_speed", "speed"),
@@ -36,7 +36,7 @@ pub(crate) fn is_segment(folder: &Path) -> bool {
     folder.join(SPEED).join("t").is_file() || folder.join(FRAME_TIMES).is_file()
 }
 
-/// Whether its images are there.
+/// Whether a segment has its video.
 pub(crate) fn has_video(folder: &Path) -> bool {
     folder.join(VIDEO).is_file()
 }
@@ -78,7 +78,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         ns: Some(*ns),
     };
     let mut streams = streams(folder)?;
-    // That of the speeds comes with the speeds.
+    // The stream of speeds is added with the speeds.
     streams.retain(|s| s.name != SPEED);
     PlainParts {
         kind: DatasetKind::Comma2k19,
@@ -103,7 +103,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     .map(|dataset| dataset.with_simulated(config.simulated))
 }
 
-/// A segment without its video.
+/// Inspects a segment without its video.
 pub(crate) fn inspect(folder: &Path, options: &OpenOptions) -> Result<Inspection> {
     let config = FolderConfig::read(folder)?;
     let camera_ahead_s = config.camera_ahead_s(options);
@@ -150,9 +150,7 @@ pub(crate) fn inspect(folder: &Path, options: &OpenOptions) -> Result<Inspection
             frames: 0,
             missing_frames: Vec::new(),
             usable_pairs: 0,
-            why_no_pairs: Some(format!(
-                "{VIDEO} is absent: the segment's images are not here"
-            )),
+            why_no_pairs: Some(format!("{VIDEO} is missing, so the segment has no images")),
             scans: 0,
             speed_mps,
             distance_m,
@@ -166,7 +164,7 @@ pub(crate) fn inspect(folder: &Path, options: &OpenOptions) -> Result<Inspection
     })
 }
 
-/// When the frames were taken, on the clock of the logs.
+/// The times of the frames, on the logs' clock, in nanoseconds.
 fn frame_times(folder: &Path) -> Result<Vec<i64>> {
     match folder.join(FRAME_TIMES) {
         path if path.is_file() => nanoseconds(&path),
@@ -217,7 +215,7 @@ fn speeds(folder: &Path, config: &FolderConfig) -> Result<Option<SpeedLog>> {
     }))
 }
 
-/// The segment's inertial unit, and its steering angle where `dataset.toml` says the vehicle's wheelbase.
+/// The segment's inertial unit, and its steering angle if `dataset.toml` has the vehicle's wheelbase.
 fn vehicle(folder: &Path, config: &FolderConfig) -> Result<Option<VehicleLog>> {
     let sensors = comma::sensors(folder).map_err(|source| Error::Motion {
         path: folder.to_owned(),
@@ -252,7 +250,7 @@ fn streams(folder: &Path) -> Result<Vec<Stream>> {
     Ok(streams)
 }
 
-/// Times of an array of seconds, which must not go back.
+/// The times in an array of seconds, which must not decrease, in nanoseconds.
 fn nanoseconds(path: &Path) -> Result<Vec<i64>> {
     let times = column(path)?;
     let mut last = f64::NEG_INFINITY;
@@ -270,7 +268,7 @@ fn nanoseconds(path: &Path) -> Result<Vec<i64>> {
     Ok(times.iter().map(|t| (t * 1e9).round() as i64).collect())
 }
 
-/// An array of N or N×1 numbers.
+/// The numbers of an array with the shape N or N×1.
 fn column(path: &Path) -> Result<Vec<f64>> {
     comma::numbers(path).map_err(|error| match error {
         deepfusion_motion::Error::File { path, source } => Error::file(&path, source),

@@ -1,4 +1,4 @@
-//! A folder of images with tables and a calibration beside them.
+//! Opens a folder of images with tables and a calibration beside them.
 
 use super::shared::files::{images_in, name_of};
 use super::shared::plain::PlainParts;
@@ -15,10 +15,10 @@ use crate::{
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Folders in which the images are looked for; then the recording's folder itself.
+/// Folders in which the images are looked for, before the recording's folder itself.
 const FOLDERS: [&str; 2] = ["images", "frames"];
 
-/// Whether a folder is one of images.
+/// Whether a folder is a folder of images.
 pub(crate) fn has_images(folder: &Path) -> Result<bool> {
     let config = FolderConfig::read(folder)?;
     Ok(config.images.is_some() || !images_in(&images_folder(folder, &config)?)?.is_empty())
@@ -52,7 +52,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         .filter_map(|i| Some((i.path.file_stem()?, i.number)));
     let depth = depth_images(folder, &config, stems.collect())?;
     let speeds = SpeedLog::read(folder, &config)?;
-    // The images' zone is of no matter without a log, nor where it is said when the first was taken.
+    // The time zone of the images' dates does not matter without a log, or if the first image's time is given.
     if speeds.is_none() || config.start_s.is_some() {
         warnings.retain(|w| !matches!(w, DataWarning::Times(TimesWarning::NoZone { .. })));
     }
@@ -65,7 +65,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         calibration,
         camera_ahead_s: config.camera_ahead_s(options),
         image_size: size,
-        // The mount turns the vehicle's motion into the camera's: of no matter where there is none.
+        // The mount converts the vehicle's motion into the camera's, so it does not matter without motion.
         mount_assumed: config.mount.is_none() && speeds.is_some(),
         speeds,
         cam_from_vehicle: config.cam_from_vehicle(),
@@ -80,10 +80,10 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     .map(|dataset| dataset.with_simulated(config.simulated))
 }
 
-/// Where the images are: a folder that `dataset.toml` names or that has a usual name, else the recording's own.
+/// The folder of the images: the one named in `dataset.toml`, otherwise one with a usual name, otherwise the recording's own.
 ///
 /// # Errors
-/// [`Error::Config`] where a named one is not there.
+/// [`Error::Config`] if a named folder does not exist.
 pub(crate) fn images_folder(folder: &Path, config: &FolderConfig) -> Result<PathBuf> {
     let found = config.find(folder, "images", config.images.as_ref(), &FOLDERS)?;
     Ok(found
@@ -91,7 +91,7 @@ pub(crate) fn images_folder(folder: &Path, config: &FolderConfig) -> Result<Path
         .unwrap_or_else(|| folder.to_owned()))
 }
 
-/// The depth images whose names are those of frames.
+/// The depth images with the names of frames.
 fn depth_images(
     folder: &Path,
     config: &FolderConfig,

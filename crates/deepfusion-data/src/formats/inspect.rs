@@ -1,4 +1,4 @@
-//! What is in a recording.
+//! Inspects the contents of recordings.
 
 use super::layout::Layout;
 use super::shared::files::name_of;
@@ -11,24 +11,25 @@ use crate::{
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Looks into a recording of any layout that [`Dataset::open`] knows. A comma2k19 segment whose video is
-/// absent, and a bag without a camera, are reported by their other streams. Where the path holds several recordings, those that cannot be
-/// read are [listed](Inspection::unreadable) beside the others, and those without images are left out as [`Dataset::open`] leaves them out,
-/// with a note; a nuScenes data set is one, as its scenes share their tables.
+/// Inspects a recording of any layout that [`Dataset::open`] knows. A comma2k19 segment without its video and a bag without a camera
+/// are reported with their other streams. If the path has several recordings, unreadable ones are
+/// [listed](Inspection::unreadable), and those without images are left out with a note, as by [`Dataset::open`]. A nuScenes data set
+/// counts as one recording, because its scenes share their tables.
+///
+/// Missing times and speeds are not errors, but reported as unknown.
 ///
 /// # Errors
-/// As [`Dataset::open`] of one recording, and of several where none can be read and all for one reason; times and speeds may be missing and
-/// are then reported as unknown.
+/// Those of [`Dataset::open`] for one recording; for several, only if none can be read, all for the same reason.
 pub fn inspect(path: &Path) -> Result<Inspection> {
     inspect_with(path, &OpenOptions::default(), |_| None)
 }
 
-/// [`inspect`] with a camera or a clock offset given; camera and split of the options are not taken. `time_offset` measures
-/// [`DriveInspection::time_offset`]: it is asked where there is one drive, and may take long (`deepfusion_doctor::inspect`
-/// has one that reads a few hundred pictures).
+/// Like [`inspect`], with a calibration or clock offset from the options, whose camera selection and split are ignored. `time_offset`
+/// measures [`DriveInspection::time_offset`]. It is only called for a single drive, and may take long (that of
+/// `deepfusion_doctor::inspect` reads a few hundred images).
 ///
 /// # Errors
-/// As [`inspect`].
+/// Those of [`inspect`].
 pub fn inspect_with(
     path: &Path,
     options: &OpenOptions,
@@ -67,7 +68,7 @@ fn inspect_layout(
         unreadable,
         without_images,
     } = inspect_all(path, layout, options).or_one_reason()?;
-    // Measuring reads many pictures: of many drives the doctor reports it one by one.
+    // Measuring reads many images. For several drives, the doctor reports the offset of each.
     if let [only] = drives.as_mut_slice() {
         only.drive.time_offset = time_offset(&only.dataset);
     }
@@ -109,17 +110,17 @@ fn inspect_layout(
     })
 }
 
-/// What several recordings hold.
+/// The contents of several recordings.
 #[derive(Default)]
 struct InspectedDrives {
     drives: Vec<InspectedDrive>,
     unreadable: Vec<UnopenedRecording>,
-    /// Those with which nothing is wrong but that they have no images.
+    /// Recordings whose only problem is that they have no images.
     without_images: Vec<UnopenedRecording>,
 }
 
 impl InspectedDrives {
-    /// A recording, and what is in it.
+    /// Adds a recording with its contents.
     fn add(&mut self, path: PathBuf, recording: Layout, inspected: Result<Vec<InspectedDrive>>) {
         let error = match inspected {
             Ok(drives) => {
@@ -140,10 +141,10 @@ impl InspectedDrives {
         }
     }
 
-    /// What was found. Where no drive was opened, those without images are among what cannot be read.
+    /// The result. If no drive was opened, recordings without images count as unreadable.
     ///
     /// # Errors
-    /// The first where no drive was opened and one reason says why.
+    /// The first error, if no drive was opened and the reason is the same for all.
     fn or_one_reason(mut self) -> Result<Self> {
         if !self.drives.is_empty() {
             return Ok(self);
@@ -171,12 +172,12 @@ struct UnopenedRecording {
 }
 
 impl UnopenedRecording {
-    /// As [`Dataset::open`] leaves recordings out: drives without images of the camera, and bags that give none.
+    /// Whether [`Dataset::open`] would leave the recording out: a drive without images of the camera, or a bag without images.
     fn lacks_images(&self) -> bool {
         self.recording.lacks_images(&self.error)
     }
 
-    /// What is wrong, without the recording's own name.
+    /// The error's message without the recording's path.
     fn reason(&self) -> String {
         let path = self.path.display().to_string();
         self.error.to_string().replace(&path, "")
@@ -190,15 +191,15 @@ impl UnopenedRecording {
     }
 }
 
-/// A drive that was opened, and what is in it.
+/// An opened drive, with its contents.
 struct InspectedDrive {
     dataset: Dataset,
     streams: Vec<Stream>,
     drive: DriveInspection,
 }
 
-/// Inspects each recording by itself. The left camera is the one that is trained on: the right one is opened only where no recording
-/// has images of the left one.
+/// Inspects each recording by itself. Training uses the left camera, so the right one is opened only if no recording has images
+/// of the left one.
 fn inspect_all(path: &Path, layout: Layout, options: &OpenOptions) -> InspectedDrives {
     let mut found = InspectedDrives::default();
     for (path, recording) in layout.apart(path) {
@@ -245,7 +246,7 @@ fn inspect_one(
     datasets.into_iter().map(inspect).collect()
 }
 
-/// Pairs slower than this are counted as unusable, as in training.
+/// Pairs slower than this count as unusable, as in training.
 const MIN_SPEED_MPS: f64 = 0.5;
 
 fn inspect_dataset(dataset: &Dataset) -> Result<DriveInspection> {
@@ -297,7 +298,7 @@ fn speeds(dataset: &Dataset) -> impl Iterator<Item = f64> {
     dataset.frames().iter().filter_map(|f| f.speed_mps)
 }
 
-/// The sum of what is known; `None` if nothing is.
+/// The sum of the known values; `None` if none is known.
 fn sum(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     values
         .flatten()

@@ -1,8 +1,8 @@
-//! KITTI-360: `data_2d_raw/<drive>/image_00/{data_rect,timestamps.txt}`, `calibration/{perspective.txt,calib_cam_to_pose.txt,
+//! Reads KITTI-360: `data_2d_raw/<drive>/image_00/{data_rect,timestamps.txt}`, `calibration/{perspective.txt,calib_cam_to_pose.txt,
 //! calib_cam_to_velo.txt}`, `data_poses/<drive>/{poses.txt,cam0_to_world.txt}`, `data_3d_raw/<drive>/velodyne_points/data`.
 //!
-//! A pose is where the inertial unit was (x forward, y right, z down, above the rear axle), in a world that does not move. Frames in which
-//! the car hardly moved have none. Cameras 0 and 1, whose images are rectified, are the left and the right one; 2 and 3 are fisheyes.
+//! A pose is that of the inertial unit (x forward, y right, z down, above the rear axle) in a fixed world frame. Frames in which
+//! the vehicle hardly moved have none. Cameras 0 (left) and 1 (right) have rectified images; 2 and 3 are fisheyes.
 
 use super::kitti::{Fields, TimeStamps, numbered_files, optional};
 use super::shared::files::{by_either_name, folders, name_of};
@@ -31,11 +31,11 @@ const PERSPECTIVE: &str = "perspective.txt";
 const CAM_TO_POSE: &str = "calib_cam_to_pose.txt";
 const CAM_TO_VELO: &str = "calib_cam_to_velo.txt";
 
-/// A drive and the root around its parts.
+/// A drive, and the root of the data set.
 #[derive(Debug)]
 pub(crate) struct Drive {
     root: PathBuf,
-    /// In `data_2d_raw`.
+    /// Path of the drive's folder in `data_2d_raw`.
     pub(crate) folder: PathBuf,
 }
 
@@ -75,7 +75,7 @@ fn is_drive(folder: &Path) -> bool {
     (0..4).any(|camera| folder.join(format!("image_0{camera}")).is_dir())
 }
 
-/// Opens the cameras of the drives found at `path`, a data set each.
+/// Opens the cameras of the drives found at `path`, each as a data set.
 pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let mut found = Vec::new();
     for drive in drives {
@@ -104,12 +104,12 @@ pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Resu
 }
 
 impl Drive {
-    /// The folder of a camera.
+    /// Path of a camera's folder.
     fn camera(&self, camera: Camera) -> PathBuf {
         self.folder.join(image_name(camera))
     }
 
-    /// `images` are not empty.
+    /// Opens one camera; `images` must not be empty.
     fn open(
         &self,
         camera: Camera,
@@ -165,7 +165,7 @@ impl Drive {
         .into_dataset()
     }
 
-    /// `world_from_vehicle` by frame number, and the file that says it; the unit's poses, else the left camera's.
+    /// `world_from_vehicle` by frame number, and the path of its file: from the unit's poses, otherwise from the left camera's.
     fn poses(&self, rig: &Rig) -> Result<(Option<PathBuf>, NumberedPoses)> {
         let place = self.root.join(POSES).join(name_of(&self.folder));
         let ways = [
@@ -183,7 +183,7 @@ impl Drive {
         Ok((None, Vec::new()))
     }
 
-    /// The scans of its frames, of which there is one each by number.
+    /// The scans of its frames; they have the frames' numbers.
     fn scans(&self, rig: &Rig, images: &[(u64, PathBuf)]) -> Result<Option<MeasuredDepth>> {
         let name = name_of(&self.folder);
         let place = self
@@ -204,14 +204,14 @@ impl Drive {
     }
 }
 
-/// A rectified camera and where it is.
+/// A rectified camera and its mount.
 struct Rig {
     calibration: CameraCalibration,
-    /// A point of the vehicle (the unit's place; x forward, y left, z up) in the rectified camera.
+    /// The transform from the vehicle (origin at the unit; x forward, y left, z up) to the rectified camera.
     cam_from_vehicle: Se3,
-    /// The same in rectified camera 0.
+    /// The transform from the vehicle to rectified camera 0.
     cam0_from_vehicle: Se3,
-    /// Unrectified camera 0, in whose axes the velodyne's place is said, in the rectified camera.
+    /// The transform from unrectified camera 0, to which the velodyne's calibration refers, to the rectified camera.
     cam_from_raw0: Se3,
 }
 
@@ -227,7 +227,7 @@ impl Rig {
         };
         let cameras = fields(PERSPECTIVE, MissingPart::Kitti360Intrinsics)?;
         let mounts = fields(CAM_TO_POSE, MissingPart::Kitti360Cameras)?;
-        // Unrectified camera axes to the unit's; the rectification turns a camera on its place.
+        // The file has the transform from the unrectified camera to the unit; rectification only rotates the camera.
         let cam_from_pose = |camera: Camera| -> Result<Se3> {
             let rect = format!("R_rect_0{}", camera.number() - 2);
             let rect = cameras.rotation(&rect)?;
@@ -258,10 +258,10 @@ impl Rig {
         })
     }
 
-    /// A velodyne point in the rectified camera.
+    /// The transform from the velodyne to the rectified camera.
     ///
     /// # Errors
-    /// [`Error::Missing`], [`Error::Pose`] for a file that is no motion.
+    /// [`Error::Missing`], [`Error::Pose`] if the file is not a rigid transform.
     fn cam_from_velo(&self, folder: &Path) -> Result<Se3> {
         let path = folder.join(CAM_TO_VELO);
         if !path.is_file() {
@@ -281,12 +281,12 @@ impl Rig {
     }
 }
 
-/// The unit's axes (x forward, y right, z down) from the vehicle's (x forward, y left, z up): half a turn about x.
+/// The transform from the vehicle's axes (x forward, y left, z up) to the unit's (x forward, y right, z down): half a turn about x.
 fn pose_from_vehicle() -> Se3 {
     Se3::from_axis_angle(Vector3::x() * PI, Vector3::zeros())
 }
 
-/// The name of a camera's folder, and of its line in the files.
+/// The name of a camera's folder, which is also the name of its line in the files.
 fn image_name(camera: Camera) -> String {
     format!("image_0{}", camera.number() - 2)
 }

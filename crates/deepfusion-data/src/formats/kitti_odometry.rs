@@ -1,8 +1,8 @@
-//! KITTI's odometry benchmark: `sequences/<nn>/{image_2,image_3,image_0,image_1,velodyne,calib.txt,times.txt}`, and
-//! `poses/<nn>.txt` of the first eleven sequences.
+//! Reads KITTI's odometry benchmark: `sequences/<nn>/{image_2,image_3,image_0,image_1,velodyne,calib.txt,times.txt}`, and
+//! `poses/<nn>.txt` for the first eleven sequences.
 //!
-//! A pose is where rectified camera 0 was, in the axes of its first place. There are no speeds: they are the poses' slopes. Nor is it
-//! said where the cameras are on the car, which is KITTI raw's.
+//! A pose is that of rectified camera 0, relative to its first pose. Speeds are not included, so they are computed from the poses. The
+//! cameras' mounts are not included either, so they are those of KITTI raw, which has the same car.
 
 use super::kitti::{Fields, cam_from_cam0, numbered_files, optional};
 use super::shared::files::{by_either_name, folders, name_of};
@@ -24,11 +24,11 @@ use std::path::{Path, PathBuf};
 const CALIBRATION: &str = "calib.txt";
 const TIMES: &str = "times.txt";
 const IMAGES: [&str; 3] = ["jpeg", "jpg", "png"];
-/// The unit above KITTI's rear axle in rectified camera 0, in metres: R_rect_00 · (cam0_from_velo · velo_from_imu) by KITTI raw's
-/// calibration of 2011_09_26.
+/// Position of the unit above the rear axle of KITTI's car in rectified camera 0, in metres: R_rect_00 · (cam0_from_velo · velo_from_imu)
+/// with KITTI raw's calibration of 2011_09_26.
 const VEHICLE_IN_CAM0: [f64; 3] = [-0.314, 0.719, -1.089];
 
-/// The sequences at a path: the folder itself, those in `sequences`, or those in it.
+/// The sequences at a path: the folder itself, those in its folder `sequences`, or those directly in it.
 pub(crate) fn find(path: &Path) -> Result<Vec<PathBuf>> {
     by_either_name(path, find_named)
 }
@@ -47,7 +47,7 @@ fn find_named(folder: PathBuf) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// A folder that says itself what it is (`dataset.toml`) is none: `times.txt` is an image folder's list of times, too.
+/// Whether a folder is a sequence. A folder with `dataset.toml` is not: an image folder may also have `times.txt`.
 fn is_sequence(folder: &Path) -> bool {
     if folder.join(FolderConfig::NAME).is_file() {
         return false;
@@ -57,7 +57,7 @@ fn is_sequence(folder: &Path) -> bool {
     tables == [true, true] || (images && tables != [false, false])
 }
 
-/// Opens the cameras of the sequences found at `path`, a data set each.
+/// Opens the cameras of the sequences found at `path`, each as a data set.
 pub(crate) fn open(
     path: &Path,
     sequences: &[PathBuf],
@@ -85,14 +85,14 @@ pub(crate) fn open(
 struct Sequence<'a> {
     folder: &'a Path,
     camera: Camera,
-    /// KITTI's number: 2 or 3, or 0 or 1 where there is grey alone.
+    /// The camera's number in KITTI: 2 or 3, or 0 or 1 if there are only grey images.
     number: u8,
-    /// Never empty.
+    /// Images with their frame numbers; never empty.
     images: Vec<(u64, PathBuf)>,
 }
 
 impl<'a> Sequence<'a> {
-    /// The colour camera's images, else those of the grey one on its side; `None` without either.
+    /// The sequence with the colour camera's images, otherwise with those of the grey camera on the same side; `None` without either.
     fn of(folder: &'a Path, camera: Camera) -> Result<Option<Self>> {
         let colour = camera.number();
         for number in [colour, colour - 2] {
@@ -197,7 +197,7 @@ impl<'a> Sequence<'a> {
     /// The scans of its frames.
     ///
     /// # Errors
-    /// [`Error::Calibration`] where there are some and nothing says where the scanner is.
+    /// [`Error::Calibration`] if there are scans, but the scanner's mount is missing.
     fn scans(
         &self,
         fields: &Fields,
@@ -214,17 +214,17 @@ impl<'a> Sequence<'a> {
     }
 }
 
-/// The poses of a sequence, where they are published.
+/// Path of a sequence's poses, if they are published.
 fn poses_of(folder: &Path) -> Option<PathBuf> {
     let root = folder.parent()?.parent()?;
     let file = root.join("poses").join(format!("{}.txt", name_of(folder)));
     file.is_file().then_some(file)
 }
 
-/// The times of a sequence's frames in nanoseconds, a line each in seconds.
+/// The times of a sequence's frames in nanoseconds, from a file with one line per frame in seconds.
 ///
 /// # Errors
-/// [`Error::Missing`]; [`Error::TimeStamp`] with the number of a line that is no time, or not after the one above.
+/// [`Error::Missing`]; [`Error::TimeStamp`] with the number of a line that is not a time, or not after the previous one.
 fn read_times(path: &Path) -> Result<Vec<i64>> {
     let bytes = std::fs::read(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::Missing {

@@ -1,7 +1,7 @@
-//! Recordings of each layout as [`Dataset`](crate::Dataset)s: one module a layout; `layout` tells them apart.
+//! Reads recordings as [`Dataset`](crate::Dataset)s, with a module for each layout; `layout` recognises the layout.
 //!
-//! Each layout makes [`DatasetParts`](crate::DatasetParts) and a [`Recording`](crate::Recording) of what it finds. All but
-//! bags and KITTI raw share one, `shared::plain`; those with poses get their speeds from `shared::pose_track`.
+//! Each layout provides [`DatasetParts`](crate::DatasetParts) and a [`Recording`](crate::Recording). All except bags and KITTI raw use
+//! the same one, `shared::plain`; layouts with poses compute their speeds with `shared::pose_track`.
 
 mod bag;
 mod comma;

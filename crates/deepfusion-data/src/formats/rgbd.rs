@@ -1,4 +1,4 @@
-//! Folders of colour, depth and pose files, one of each a frame, as the 7-Scenes data set has them.
+//! Reads folders with a colour, depth and pose file for each frame, as in the 7-Scenes data set.
 
 use super::shared::files::{folders, images_in, name_of};
 use super::shared::plain::{PlainParts, open_each};
@@ -16,7 +16,7 @@ use deepfusion_geometry::Se3;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Millimetres, and the value of pixels without depth.
+/// Unit of the depth images (millimetres), and the value of pixels without depth.
 const UNIT_M: f64 = 0.001;
 const INVALID: u16 = 65_535;
 
@@ -34,7 +34,7 @@ pub(crate) fn find(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Opens sequences found at `path`, a data set each; those without a selected frame are left out.
+/// Opens each sequence found at `path` as a data set, except those without a selected frame.
 pub(crate) fn open(
     path: &Path,
     sequences: &[PathBuf],
@@ -125,8 +125,8 @@ fn colour_images(folder: &Path) -> Result<BTreeMap<u64, PathBuf>> {
         .collect())
 }
 
-/// A pose file: `world_from_cam` as four rows of four numbers, in metres; `None` where the tracker had lost
-/// the camera, which 7-Scenes writes as numbers that are not finite.
+/// Reads a pose file: `world_from_cam` as four rows of four numbers, in metres. `None` for numbers that are not finite,
+/// which 7-Scenes writes if tracking was lost.
 fn read_pose(path: &Path) -> Result<Option<Se3>> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
     let bad = |problem: PoseFileProblem| Error::Columns {

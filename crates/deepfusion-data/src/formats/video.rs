@@ -1,4 +1,4 @@
-//! A video file with tables and a calibration beside it.
+//! Opens a video file with tables and a calibration beside it.
 
 use super::shared::frames_place::folder_for_frames;
 use super::shared::plain::PlainParts;
@@ -17,18 +17,18 @@ use deepfusion_video::{VideoFrames, is_video};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The video of a folder.
+/// The video in a folder.
 #[derive(Debug)]
 pub(crate) struct InFolder {
     pub(crate) file: PathBuf,
-    /// Whether `dataset.toml` names it.
+    /// Whether it is named in `dataset.toml`.
     pub(crate) named: bool,
 }
 
-/// The video of a folder: that which `dataset.toml` names, or the only one.
+/// The video in a folder: the one named in `dataset.toml`, or the only one.
 ///
 /// # Errors
-/// [`Error::Config`] where a named one is not there or there are several.
+/// [`Error::Config`] if a named video does not exist, or none is named and there are several.
 pub(crate) fn in_folder(folder: &Path) -> Result<Option<InFolder>> {
     let config = FolderConfig::read(folder)?;
     if config.images.is_some() {
@@ -54,7 +54,7 @@ pub(crate) fn in_folder(folder: &Path) -> Result<Option<InFolder>> {
     }
 }
 
-/// Opens a video file, or the video of a folder, wherever that has it from: tables and settings are the folder's.
+/// Opens a video file, or the video of a folder, which may be elsewhere; tables and settings are those of the folder.
 pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     let (file, folder) = if place.is_dir() {
         let file = in_folder(place)?.map_or_else(|| place.to_owned(), |found| found.file);
@@ -66,7 +66,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     let config = FolderConfig::read(&folder)?;
     let mut warnings = Vec::new();
     let video = frames_of(&file, &config, &mut warnings)?;
-    // Whether the video itself is whole, ffmpeg has said.
+    // Ignore errors here: ffmpeg has already checked the video.
     let lens = may_hold_log(&file).then(|| GoproLens::read(&file).ok().flatten());
     let lens = lens.flatten();
     let calibration = find_camera(
@@ -113,7 +113,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         Some(known) => numbers_by_time(&known),
         None => (0..video.count() as u64).collect(),
     };
-    // Neither matters to a video alone.
+    // Neither matters without speeds.
     if start_s.is_none() && speeds.is_some() {
         warnings.push(TimesWarning::VideoOnTablesClock.into());
     }
@@ -130,7 +130,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         calibration,
         camera_ahead_s: config.camera_ahead_s(options),
         image_size: video.size(),
-        // The mount turns the vehicle's motion into the camera's: of no matter where there is none.
+        // The mount converts the vehicle's motion into the camera's, so it does not matter without motion.
         mount_assumed: config.mount.is_none() && speeds.is_some(),
         speeds,
         cam_from_vehicle: config.cam_from_vehicle(),
@@ -147,8 +147,8 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     .map(|dataset| dataset.with_simulated(config.simulated))
 }
 
-/// What is wrong with the camera of a GoPro's video that was not filmed through its linear lens; nothing where the calibration has its own
-/// model of the lens.
+/// The warning about a GoPro's video that was not filmed through the linear lens; `None` if the calibration includes a lens
+/// distortion.
 fn bent_warning(lens: &GoproLens, calibration: &CameraCalibration) -> Option<CameraWarning> {
     if lens.is_linear() || calibration.distortion != Distortion::default() {
         return None;
@@ -171,7 +171,7 @@ fn name_of(lens: &GoproLens) -> String {
     }
 }
 
-/// Why a GoPro's video does not say its camera.
+/// The error about a GoPro's video from which the camera cannot be derived.
 fn no_pinhole(video: &Path, lens: &GoproLens) -> Error {
     let model = lens.model.clone();
     let problem = if lens.is_linear() {
@@ -186,9 +186,9 @@ fn no_pinhole(video: &Path, lens: &GoproLens) -> Error {
     }
 }
 
-/// When a video of dates' speeds began, whose own times count from 0: recorders say when it was made, and mean its first frame or
-/// its last; that is taken of which more lies within the log. `None` where the video's times are dates themselves, or the log's are
-/// none.
+/// The beginning of a video whose times count from 0, for speeds with dates. The recorder's date is that of the first or the last
+/// frame; the choice that puts more of the video within the log is used. `None` if the video's times are dates themselves, or the log's are
+/// not.
 fn begun(created_ns: i64, times: &[Option<i64>], log: (i64, i64)) -> Option<i64> {
     let first = (*times.first()?)?;
     let is_date = |ns: i64| TimeUnit::of_date(ns as f64).is_some();
@@ -205,20 +205,20 @@ fn begun(created_ns: i64, times: &[Option<i64>], log: (i64, i64)) -> Option<i64>
     })
 }
 
-/// From a video's first frame to its last; of a single one it is no time, but some.
+/// The time from a video's first frame to its last, at least 1 ns, so that a video of a single frame is not empty.
 fn length_ns(times: &[Option<i64>]) -> Option<i64> {
     let (first, last) = ((*times.first()?)?, (*times.last()?)?);
     Some(last.saturating_sub(first).max(1))
 }
 
-/// How much lies within a log of a video that begins at `start_ns`.
+/// How much of a video that begins at `start_ns` is within a log.
 fn within_ns(start_ns: i64, length_ns: i64, log: (i64, i64)) -> i64 {
     let end_ns = start_ns.saturating_add(length_ns).min(log.1);
     end_ns.saturating_sub(start_ns.max(log.0)).max(0)
 }
 
-/// What is said of the zone of a recorder's date, which is taken for UTC: where nothing of the video is within the log by it, and of a
-/// GoPro, which writes what its clock on the back shows, where by another zone's time as much is within the log.
+/// The warning about a recorder's date, which is assumed to be UTC: if no part of the video is then within the log, or, for a GoPro, which
+/// writes local time, if at least as much of it is within the log with another time zone.
 fn zone_warning(
     created_ns: i64,
     times: &[Option<i64>],
@@ -247,29 +247,29 @@ fn zone_warning(
     Some(TimesWarning::LocalRecorder { model })
 }
 
-/// A video whose recorder's clock shows the time of a zone.
+/// A video, on the assumption that its recorder's clock shows the time of some time zone.
 struct InZone {
-    /// How far that zone is ahead of UTC.
+    /// How far that time zone is ahead of UTC, in minutes.
     ahead_min: i64,
-    /// When the video then began.
+    /// When the video then began, nanoseconds since 1970.
     start_ns: i64,
-    /// How much of it is then within the log.
+    /// How much of it is then within the log, in nanoseconds.
     within_ns: i64,
 }
 
 const MINUTE_NS: i64 = 60_000_000_000;
 
-/// How far the zones of the earth are ahead of UTC, in minutes.
+/// How far the world's time zones are ahead of UTC, in minutes.
 fn zones_min() -> impl Iterator<Item = i64> {
-    /// Those of parts of an hour, from the Marquesas to the Chatham Islands.
+    /// Offsets that are not whole hours, from the Marquesas to the Chatham Islands.
     const UNEVEN: [i64; 13] = [
         -570, -210, -150, 210, 270, 330, 345, 390, 525, 570, 630, 765, 825,
     ];
     (-12..=14).map(|hours| 60 * hours).chain(UNEVEN)
 }
 
-/// When a video began by the zone by which most of it is within the log. Of several alike the one of whole hours is taken, as most are;
-/// `None` where that is not a single one.
+/// The beginning of a video in the time zone that puts most of it within the log. If several do, the only one with whole hours is used,
+/// since most have these; `None` if it is not unique.
 fn likeliest(zones: &[InZone]) -> Option<i64> {
     let most_ns = zones.iter().map(|zone| zone.within_ns).max()?;
     let alike = zones.iter().filter(|zone| zone.within_ns == most_ns);
@@ -278,14 +278,14 @@ fn likeliest(zones: &[InZone]) -> Option<i64> {
     Some(zone.start_ns)
 }
 
-/// What there is one of.
+/// The only item; `None` if there are none or several.
 fn only<T>(mut all: impl Iterator<Item = T>) -> Option<T> {
     let first = all.next()?;
     all.next().is_none().then_some(first)
 }
 
-/// The frames of a video, kept where `dataset.toml` says, else beside it or, where nothing can be written there, in the user's cache folder,
-/// which becomes one of the `warnings`.
+/// The frames of a video, kept in the cache folder of `dataset.toml`, otherwise beside the video or, if its folder is not writable, in the
+/// user's cache folder, with a warning.
 ///
 /// # Errors
 /// [`Error::Video`], [`Error::NoPlaceForFrames`].
@@ -310,7 +310,7 @@ pub(crate) fn frames_of(
 mod tests {
     use super::*;
 
-    /// A minute of video whose recorder wrote what its clock on the wall says: summer time, and logs in UTC.
+    /// A minute of video whose recorder wrote local summer time, and logs in UTC.
     #[test]
     fn local_time_beside_a_log_in_utc_is_warned_of() {
         const S: i64 = 1_000_000_000;
@@ -328,13 +328,13 @@ mod tests {
         let in_india = began + 5 * H + H / 2;
         assert_eq!(said(in_india, half_an_hour, None), beside(Some(began)));
         assert_eq!(said(day - 9 * 24 * H, half_an_hour, None), beside(None));
-        // Several zones are within a long log, and none is likelier.
+        // Several time zones put the video within a long log, and none is likelier.
         assert_eq!(said(began + 6 * H, five_hours, None), beside(None));
-        // A video of one picture lies within its log, too.
+        // A video of a single frame can be within its log too.
         assert_eq!(zone_warning(day, &[Some(0)], half_an_hour, None), None);
     }
 
-    /// A GoPro's clock may show UTC, and no zone may be ahead of it: where the log is short that shows.
+    /// A GoPro's clock may show UTC, which a short log can confirm.
     #[test]
     fn a_gopro_is_warned_of_where_its_clock_may_show_another_zone() {
         const S: i64 = 1_000_000_000;
@@ -346,12 +346,12 @@ mod tests {
         let recorder = TimesWarning::LocalRecorder { model };
         assert_eq!(said((day, day + H / 2)), None);
         assert_eq!(said((day, day + 4 * H)), Some(recorder.clone()));
-        // An hour later more of it is within, and then less.
+        // In the zone one hour off, first more, then less of it is within the log.
         assert_eq!(said((day + 90 * S, day + 2 * H)), Some(recorder));
         assert_eq!(said((day, day + H + 30 * S)), None);
     }
 
-    /// A minute of video, made at the moment that both kinds of recorders write.
+    /// A minute of video, with the date that each of the two kinds of recorders writes.
     #[test]
     fn a_video_begins_where_its_log_has_speeds() {
         const S: i64 = 1_000_000_000;
@@ -361,23 +361,23 @@ mod tests {
         assert_eq!(
             begun(day, &times, log),
             Some(day),
-            "it was made when it began"
+            "the date is that of the first frame"
         );
         assert_eq!(
             begun(day + 60 * S, &times, log),
             Some(day),
-            "or when it ended"
+            "the date is that of the last frame"
         );
         let longer = (day - 600 * S, day + 600 * S);
         assert_eq!(
             begun(day, &times, longer),
             Some(day),
-            "either fits: the first frame"
+            "both fit: the first frame is used"
         );
         assert_eq!(
             begun(day, &times, (0, 60 * S)),
             None,
-            "the log counts from 0, too"
+            "the log's times count from 0 too"
         );
         let dates = times.map(|t| t.map(|t| t + day));
         assert_eq!(begun(day, &dates, log), None, "the video's times are dates");

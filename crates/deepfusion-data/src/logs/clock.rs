@@ -1,8 +1,8 @@
-//! Times as recorders write them: in some unit, from some beginning, kept as whole nanoseconds.
+//! Converts times in any unit to whole nanoseconds.
 
 use std::ops::RangeInclusive;
 
-/// Unit of a written time.
+/// Unit of a time in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TimeUnit {
     Seconds,
@@ -11,11 +11,11 @@ pub(crate) enum TimeUnit {
     Nanoseconds,
 }
 
-/// Seconds since 1970 from 2000 to 2100: numbers in this range times a unit are taken for dates.
+/// Seconds since 1970 for the years 2000 to 2100. Numbers in this range, in some unit, count as dates.
 const EPOCH_S: RangeInclusive<f64> = 9.46e8..=4.102e9;
 
 impl TimeUnit {
-    /// By the name in a header or in `dataset.toml`.
+    /// The unit with this name in a header or in `dataset.toml`.
     pub(crate) fn named(name: &str) -> Option<Self> {
         match name {
             "s" | "sec" | "second" | "seconds" => Some(Self::Seconds),
@@ -26,7 +26,7 @@ impl TimeUnit {
         }
     }
 
-    /// Its sign.
+    /// The unit's symbol.
     pub(crate) fn symbol(self) -> &'static str {
         match self {
             Self::Seconds => "s",
@@ -36,7 +36,7 @@ impl TimeUnit {
         }
     }
 
-    /// Decimal digits from it down to nanoseconds.
+    /// Number of decimal digits from this unit down to nanoseconds.
     fn digits(self) -> usize {
         match self {
             Self::Seconds => 9,
@@ -46,7 +46,7 @@ impl TimeUnit {
         }
     }
 
-    /// How many of it are a second.
+    /// How many of this unit make a second.
     pub(crate) fn per_second(self) -> f64 {
         10_f64.powi(9 - self.digits() as i32)
     }
@@ -63,14 +63,14 @@ impl TimeUnit {
         units.into_iter().find(is_date)
     }
 
-    /// The unit that numbers without one must be in: that in which the first is a date; else seconds,
-    /// where the median step is a second at most. Steps of 40 could be milliseconds or frames: `None`.
+    /// The likely unit of numbers without one: that in which the first is a date, otherwise seconds if
+    /// the median step is at most 1. `None` if ambiguous: steps of 40 could be milliseconds or frames.
     pub(crate) fn of_numbers(numbers: &[f64]) -> Option<Self> {
         let first = *numbers.first()?;
         if let Some(unit) = Self::of_date(first) {
             return Some(unit);
         }
-        // Of either sign: that times go back is reported elsewhere.
+        // Ignore the sign: decreasing times are reported elsewhere.
         let steps = numbers.windows(2).map(|w| (w[1] - w[0]).abs());
         let mut steps: Vec<f64> = steps.collect();
         steps.sort_by(f64::total_cmp);
@@ -78,8 +78,8 @@ impl TimeUnit {
         (median > 0.0 && median <= 1.0).then_some(Self::Seconds)
     }
 
-    /// A written number as nanoseconds, to the last digit: an f64 of seconds since 1970 has a quarter of a
-    /// microsecond. `None` for what is not a number, or is beyond 292 years.
+    /// A number in text as nanoseconds, with all digits: an f64 of seconds since 1970 has a resolution of a quarter of a
+    /// microsecond. `None` if it is not a number, or beyond 292 years.
     pub(crate) fn nanoseconds(self, word: &str) -> Option<i64> {
         let word = word.trim();
         let (negative, digits) = match word.strip_prefix('-') {
@@ -89,7 +89,7 @@ impl TimeUnit {
         let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
         let plain = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
         if !plain(whole) || !plain(fraction) || whole.len() + fraction.len() == 0 {
-            // An exponent: such a number has no digits to keep.
+            // With an exponent, there are no digits to preserve.
             let value = word.parse::<f64>().ok()? * 10_f64.powi(self.digits() as i32);
             return (value.abs() < 9e18).then_some(value.round() as i64);
         }
@@ -102,7 +102,7 @@ impl TimeUnit {
     }
 }
 
-/// A time of the camera's clock on the vehicle's, of which the camera's is `ahead_s` seconds ahead.
+/// Converts a time on the camera's clock, which is `ahead_s` seconds ahead, to the vehicle's clock.
 pub(crate) fn on_the_vehicles_clock(ns: i64, ahead_s: f64) -> i64 {
     ns.saturating_sub((ahead_s * 1e9).round() as i64)
 }

@@ -1,4 +1,4 @@
-//! A date and a time of day in words, as KITTI writes them.
+//! Parses dates with a time of day, as KITTI writes them.
 
 use crate::TimeStampProblem;
 
@@ -39,8 +39,8 @@ fn digits(word: &str) -> Option<i64> {
     if plain { word.parse().ok() } else { None }
 }
 
-/// Days from 1970-01-01 in the Gregorian calendar (years counted from March, so that the leap day is
-/// a year's last).
+/// Days since 1970-01-01 in the Gregorian calendar (years counted from March, so that the leap day is
+/// a year's last day).
 fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
     let y = if month <= 2 { year - 1 } else { year };
     let month_from_march = (month + 9) % 12;
@@ -71,7 +71,7 @@ mod tests {
             let _ = parse(&text);
         }
 
-        /// Later clock readings are later times, by as much.
+        /// The difference of two times of day is that of the parsed times.
         #[test]
         fn times_of_a_day_are_in_order(a in 0i64..86_400, b in 0i64..86_400, ns in 0i64..1_000_000_000) {
             let stamp = |s: i64| parse(&format!("2011-09-26 {:02}:{:02}:{:02}.{ns:09}", s / 3600, s / 60 % 60, s % 60)).unwrap();

@@ -1,4 +1,4 @@
-//! When the images of a folder were taken, and which of them are neighbours.
+//! The times of the images in a folder, and which of them are neighbours.
 
 use super::clock::{TimeUnit, seconds};
 use super::date_time;
@@ -25,12 +25,12 @@ pub(crate) struct TimedImage {
     pub(crate) ns: Option<i64>,
 }
 
-/// The images in order of their numbers.
+/// The images ordered by number.
 ///
-/// Times are those of `frames.csv` (columns time and file), of the lines of `timestamps.txt` or `times.txt`,
-/// of `fps` in `dataset.toml`, or of the files' names where those are dates (1403636579763555584.png,
-/// 1305031102.175304.png). Numbers are the files' where they have some that are no dates; else they count
-/// from 0, a longer pause than usual taking as many numbers as frames are missing in it.
+/// Times come from `frames.csv` (columns time and file), from the lines of `timestamps.txt` or `times.txt`,
+/// from `fps` in `dataset.toml`, or from the files' names if these are dates (1403636579763555584.png,
+/// 1305031102.175304.png). Numbers are those in the files' names, unless these are dates. Otherwise they count
+/// from 0, and a pause takes as many numbers as frames are missing in it.
 ///
 /// # Errors
 /// [`Error::Table`], [`Error::Columns`], [`Error::TimeStamp`], [`Error::NoTimeStamp`].
@@ -54,7 +54,7 @@ pub(crate) fn timed_images(
             .map(Some)
             .collect()
     } else if let Some(fps) = config.fps {
-        // Names that are dates count no frames.
+        // Names that are dates are not frame numbers.
         let numbers = match dates {
             Some(_) => (0..images.len() as u64).collect(),
             None => numbers(&images, None),
@@ -78,7 +78,7 @@ pub(crate) fn timed_images(
     Ok(timed.collect())
 }
 
-/// The times moved so that the first is at `start_s`.
+/// The times, shifted so that the first is at `start_s`.
 pub(crate) fn from_start(times: Vec<Option<i64>>, start_s: Option<f64>) -> Vec<Option<i64>> {
     let (Some(start_s), Some(Some(first))) = (start_s, times.first().copied()) else {
         return times;
@@ -92,7 +92,7 @@ fn stem(path: &Path) -> &str {
     path.file_stem().and_then(|s| s.to_str()).unwrap_or("")
 }
 
-/// The number that a file's name is.
+/// The file's name as a number.
 fn number(path: &Path) -> Option<u64> {
     let stem = stem(path);
     stem.bytes()
@@ -104,7 +104,7 @@ fn have_numbers(images: &[PathBuf]) -> bool {
     images.iter().all(|path| number(path).is_some())
 }
 
-/// By number where all names are numbers; otherwise by name, the numbers in it by their values.
+/// The images ordered by number if all names are numbers, otherwise in natural order of their names.
 fn in_order(mut images: Vec<PathBuf>) -> Vec<PathBuf> {
     if have_numbers(&images) {
         images.sort_by_cached_key(|path| (number(path), path.clone()))
@@ -114,7 +114,7 @@ fn in_order(mut images: Vec<PathBuf>) -> Vec<PathBuf> {
     images
 }
 
-/// The times that the files' names are, if they are dates in one unit.
+/// The times in the files' names, if all are dates in the same unit.
 fn name_dates(images: &[PathBuf]) -> Option<(Vec<i64>, TimeUnit)> {
     let unit = TimeUnit::of_date(stem(images.first()?).parse().ok()?)?;
     let date = |path: &PathBuf| {
@@ -125,7 +125,7 @@ fn name_dates(images: &[PathBuf]) -> Option<(Vec<i64>, TimeUnit)> {
     Some((dates?, unit))
 }
 
-/// The numbers of the files' names; without such, numbers by time, or from 0.
+/// The numbers in the files' names; otherwise numbers by time, or from 0.
 fn numbers(images: &[PathBuf], times_ns: Option<&[i64]>) -> Vec<u64> {
     if let Some(times) = times_ns {
         return numbers_by_time(times);
@@ -135,10 +135,10 @@ fn numbers(images: &[PathBuf], times_ns: Option<&[i64]>) -> Vec<u64> {
     rising.unwrap_or_else(|| (0..images.len() as u64).collect())
 }
 
-/// Most numbers that a pause takes.
+/// Most numbers that are left out in a pause.
 const MOST_MISSING: f64 = 1e5;
 
-/// Numbers that leave out as many as frames are missing in a pause.
+/// Frame numbers that leave out as many numbers as frames are missing in a pause.
 pub(crate) fn numbers_by_time(times_ns: &[i64]) -> Vec<u64> {
     let steps: Vec<f64> = times_ns.windows(2).map(|w| seconds(w[1], w[0])).collect();
     let mut sorted = steps.clone();
@@ -153,14 +153,14 @@ pub(crate) fn numbers_by_time(times_ns: &[i64]) -> Vec<u64> {
         } else {
             1.0
         };
-        // A break of hours is a break: what goes through all numbers need not go through those of years.
+        // Limit long breaks, so that loops over all numbers do not take forever.
         next += frames.clamp(1.0, MOST_MISSING) as u64;
         numbers.push(next);
     }
     numbers
 }
 
-/// The images that `frames.csv` lists, with their times.
+/// The images listed in `frames.csv`, with their times.
 fn from_table(
     path: &Path,
     images: &[PathBuf],
@@ -196,7 +196,7 @@ fn from_table(
     Ok((listed, ns.into_iter().map(Some).collect()))
 }
 
-/// A list's times, one a line, as many as there are images.
+/// The times in a list, one per line; there must be as many as images.
 fn from_list(
     path: &Path,
     images: usize,
@@ -224,7 +224,7 @@ fn from_list(
         });
     }
     let number = |text: &str| text.trim().parse::<f64>().ok();
-    // Numbers, or dates as KITTI has them or in other forms: the first line tells.
+    // The first line determines whether the times are numbers or dates, as in KITTI or in other forms.
     let dates = lines.first().is_some_and(|(_, l)| number(l).is_none());
     let numbers: Vec<f64> = lines.iter().map_while(|(_, l)| number(l)).collect();
     let unit = match &config.time_unit {
@@ -243,12 +243,12 @@ fn from_list(
     for (line, text) in &lines {
         let ns = if dates {
             let plain = || Some((date_time::parse(text).ok()?, false));
-            // Dates of which some say their zone and others do not are of two clocks.
+            // Dates with and without a time zone would be on two clocks.
             let alike = |(_, own): &(i64, bool)| *zoned.get_or_insert(*own) == *own;
             let date = plain().or_else(|| parse_date(text)).filter(alike);
             date.map(|(ns, _)| ns)
         } else {
-            // A line that is not a number has kept the unit from being known: it is the one to be named.
+            // If the unit is unknown because a line is not a number, report that line.
             number(text).and_then(|_| unit.unwrap_or(TimeUnit::Seconds).nanoseconds(text))
         };
         let text = text.trim();

@@ -33,7 +33,7 @@ fn names_that_are_dates_are_times() {
         (1, Some(first + 49_999_872)),
         (3, Some(first + 149_999_872)),
     ];
-    // Two steps, 50 and 100 ms: the median is the longer, so one more of 50 is needed.
+    // With two steps, 50 and 100 ms, the median would be the longer, so another of 50 is needed.
     let names: Vec<&str> = names.into_iter().chain(["1403636579963555456"]).collect();
     let found = timed(&names, &[]).unwrap();
     assert_eq!(found[..3], expected);
@@ -57,7 +57,7 @@ fn numbers_are_kept_and_need_a_rate() {
     assert_eq!(found.unwrap(), [(5, Some(3000 * MS)), (7, Some(3080 * MS))]);
 }
 
-/// `fps` beside EuRoC's names counts the frames: as numbers these names are years.
+/// With `fps`, EuRoC's names are not used as frame numbers: the frames would be years apart.
 #[test]
 fn a_rate_counts_frames_whose_names_are_dates() {
     let names = ["1403636579763555584", "1403636579813555456"];
@@ -117,7 +117,7 @@ fn dates_with_a_zone_are_read() {
     }
 }
 
-/// Hours off from a log in UTC where they are local.
+/// Dates without a time zone would be off by hours from a log in UTC if they are local.
 #[test]
 fn dates_without_a_zone_are_warned_of_once_a_list() {
     let warned = |list: &str| {
@@ -159,7 +159,7 @@ fn what_is_wrong_is_named() {
         (
             "timestamps.txt",
             "0\n40\n",
-            "timestamps.txt: nothing says the unit",
+            "timestamps.txt: the unit of its times is not given",
         ),
         (
             "frames.csv",

@@ -1,7 +1,7 @@
-//! Tables and tracks beside the images: times, speeds, turns.
+//! Reads tables and tracks beside the images: times, speeds, turns.
 //!
-//! `table` reads this program's own tables, `clock` and `date_time` their times; `speed_log` makes a vehicle's motion of them or of any other
-//! log that `deepfusion-logs` reads (with `vehicle_log` where there is an inertial unit), and `frame_times` says when the images were taken.
+//! `table` reads this program's own tables, and `clock` and `date_time` their times. `speed_log` computes a vehicle's motion from them or
+//! from any other log that `deepfusion-logs` reads, with `vehicle_log` for an inertial unit. `frame_times` reads the times of the images.
 
 pub(crate) mod clock;
 pub(crate) mod date_time;

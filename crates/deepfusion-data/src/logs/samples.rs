@@ -3,27 +3,27 @@
 use super::clock::seconds;
 use crate::{DataWarning, MotionWarning};
 
-/// Samples farther apart are not bridged, as in [`crate::VehicleTrack`].
+/// Longest gap between samples across which users of the samples interpolate, as in [`crate::VehicleTrack`].
 const MAX_GAP_S: f64 = 0.5;
-/// A step between samples from which on a log is a slow one; what is filled in is no farther apart.
+/// Longer steps are filled with samples at most this far apart.
 const SLOW_S: f64 = 0.25;
-/// Longest gap of a slow log that is bridged unasked: a car does not stop and start again within it.
+/// Longest gap of a slow log that is bridged by default: too short for a vehicle to stop and start again.
 const MOST_BRIDGED_S: f64 = 3.5;
 
 /// Values at times, on the recording's clock.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Samples {
-    /// In nanoseconds.
+    /// Times in nanoseconds.
     pub(crate) ns: Vec<i64>,
-    /// In m/s or rad/s.
+    /// Values in m/s or rad/s.
     pub(crate) values: Vec<f64>,
 }
 
 impl Samples {
-    /// The same with steps that are longer than [`SLOW_S`] and not too long filled in a straight line: to `most` seconds, else to
-    /// three times the usual step where that is long, a few seconds at most. Steps of half a second are filled, too: whoever reads the samples bridges [`MAX_GAP_S`] at
-    /// most, and rounded times are on either side of it. What was done is added to the warnings, with the samples'
-    /// name and the setting that `most` is of.
+    /// The same samples with steps longer than [`SLOW_S`] filled by linear interpolation: steps of up to `most` seconds, or by default up
+    /// to three times the usual step if that is long, but at most a few seconds. Steps of half a second are filled too, because users of
+    /// the samples interpolate across at most [`MAX_GAP_S`], and rounded times are on both sides of it. Notes are added to the warnings,
+    /// with the samples' name and the setting of `most`.
     pub(crate) fn bridged(
         mut self,
         most: Option<f64>,
@@ -86,7 +86,7 @@ impl Samples {
         self
     }
 
-    /// The value at a time, straight between its neighbours; `None` beyond the ends and across gaps.
+    /// The value at a time, interpolated linearly; `None` beyond the ends and in gaps.
     pub(crate) fn at(&self, ns: i64) -> Option<f64> {
         let after = self.ns.partition_point(|t| *t < ns);
         if self.ns.get(after) == Some(&ns) {
@@ -105,7 +105,7 @@ impl Samples {
 mod tests {
     use super::*;
 
-    /// Half a second after half a second, as a clock of dates has it.
+    /// Steps of half a second, from times given as dates.
     #[test]
     fn two_samples_a_second_leave_no_gap() {
         let ns: Vec<i64> = (0..20)

@@ -1,4 +1,4 @@
-//! `speed.csv`, and the turns from it or from `imu.csv`: a yaw rate, or a whole inertial unit.
+//! Reads `speed.csv`, and turns from it or from `imu.csv`: a yaw rate, or a complete inertial unit.
 
 use super::clock::seconds;
 use super::samples::Samples;
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 const SPEEDS: [&str; 4] = ["speed", "velocity", "vehicle_speed", "v"];
 const SIGMAS: [&str; 3] = ["speed_sigma", "speed_accuracy", "speed_std"];
-/// Longest times over which a receiver's turns and its standard deviations hold, in seconds.
+/// Longest gaps across which a receiver's turns and its standard deviations are interpolated, in seconds.
 const COURSE_GAP_S: f64 = 3.0;
 const SIGMA_GAP_S: f64 = 10.0;
 const YAW_RATES: [&str; 6] = [
@@ -36,26 +36,26 @@ pub(crate) struct SpeedLog {
     pub(crate) path: PathBuf,
     pub(crate) speeds_mps: Samples,
     pub(crate) yaw_rates_radps: Option<Samples>,
-    /// How the course over ground turned, where positions alone say it.
+    /// Rate of turn of the course over ground, if only positions give turns.
     pub(crate) course_rates_radps: Option<Samples>,
-    /// Standard deviations of the speeds, where the log has them.
+    /// Standard deviations of the speeds, if the log has them.
     pub(crate) sigmas_mps: Option<Samples>,
-    /// Roll and pitch by time, where poses say them beside a yaw rate.
+    /// Roll and pitch with their times (ns), if poses give them in addition to a yaw rate.
     pub(crate) tilts_rad: Vec<(i64, [f64; 2])>,
-    /// An inertial unit, where all six of its columns are there: then the motion comes from its fusion with the speed.
+    /// An inertial unit, if all six of its columns exist. The motion is then fused from it and the speed.
     pub(crate) vehicle: Option<VehicleLog>,
-    /// What was found, for the inspection.
+    /// The streams found, for the inspection.
     pub(crate) streams: Vec<Stream>,
     pub(crate) warnings: Vec<DataWarning>,
 }
 
 impl SpeedLog {
-    /// Reads the tables that `dataset.toml` names, or `speed.csv` and `imu.csv`, or a receiver's track in place of the first;
+    /// Reads the tables named in `dataset.toml`, or `speed.csv` and `imu.csv`, or a GPS track instead of the former;
     /// `None` without speeds.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] where a named table is absent, [`crate::Error::Log`] for another program's log that cannot be read, [`crate::Error::Columns`] where a column is
-    /// missing or its unit is not said, [`crate::Error::Table`] for a bad value or a time that goes back.
+    /// [`crate::Error::Config`] if a named table is missing, [`crate::Error::Log`] if another program's log cannot be read,
+    /// [`crate::Error::Columns`] if a column or its unit is missing, [`crate::Error::Table`] for an invalid value or a decreasing time.
     pub(crate) fn read(folder: &Path, config: &FolderConfig) -> Result<Option<Self>> {
         let speed = config.find(folder, "speed", config.speed.as_ref(), &["speed.csv"])?;
         let imu = config.find(folder, "imu", config.imu.as_ref(), &["imu.csv"])?;
@@ -148,16 +148,16 @@ impl SpeedLog {
         }))
     }
 
-    /// What a receiver's track says beside the speeds, on the frames' clock.
+    /// A GPS receiver's measurements other than speed, on the frames' clock.
     pub(crate) fn receiver(&self, origin_ns: i64) -> Receiver {
         let course = self.course_rates_radps.as_ref();
         receiver(course, self.sigmas_mps.as_ref(), origin_ns)
     }
 
-    /// The car's motion on the frames' clock, and whether its turns are known.
+    /// The vehicle's motion on the frames' clock, and whether its turns are known.
     ///
     /// # Errors
-    /// [`Error::Motion`] for an inertial unit or a steering angle that cannot be read as configured.
+    /// [`Error::Motion`] for an inertial unit or a steering angle that cannot be used as configured.
     pub(crate) fn motion(&self, origin_ns: i64) -> Result<(MotionModel, bool)> {
         match &self.vehicle {
             Some(vehicle) => {
@@ -171,8 +171,8 @@ impl SpeedLog {
         }
     }
 
-    /// The motion by speed and yaw rate alone. Where the yaw rate has other times than the speed, the track
-    /// has both: between samples either is straight, so that its integrals stay exact.
+    /// The motion from speed and yaw rate only. If the two have different times, the track has samples at
+    /// both: between samples both are linear, so that its integrals stay exact.
     fn track(&self, origin_ns: i64) -> VehicleTrack {
         let Some(yaw) = &self.yaw_rates_radps else {
             let samples = self.speeds_mps.ns.iter().zip(&self.speeds_mps.values);
@@ -198,7 +198,8 @@ impl SpeedLog {
     }
 }
 
-/// What a receiver's track says beside the speeds, on the frames' clock: turns of its course (rad/s), and how sure the speeds are (m/s).
+/// A GPS receiver's measurements other than speed, on the frames' clock: rate of turn of its course (rad/s), and standard deviations of the
+/// speeds (m/s).
 pub(crate) fn receiver(
     course_rates_radps: Option<&Samples>,
     sigmas_mps: Option<&Samples>,
@@ -215,14 +216,14 @@ pub(crate) fn receiver(
     }
 }
 
-/// A table of this program's kind, or what another program wrote.
+/// A table in this program's format, or another program's log.
 enum LogFile {
     Own(Table),
     Foreign(DriveLog),
 }
 
-/// Reads a table whose columns have the names that are asked for here; anything else as `deepfusion-logs` does. Where that cannot make
-/// anything of a table either, the error is this program's own, which says what a table of its kind looks like.
+/// Reads a table in this program's format, according to its column names, or anything else with `deepfusion-logs`. If that cannot read
+/// a table either, the error is this program's own, which describes its format.
 fn own_or_foreign(path: &Path, config: &FolderConfig) -> Result<LogFile> {
     let options = ReadOptions {
         time: config.time_column.clone(),
@@ -250,10 +251,10 @@ fn own_or_foreign(path: &Path, config: &FolderConfig) -> Result<LogFile> {
         .or_else(|error| foreign().map_err(|_| error))
 }
 
-/// The only GPS track of a folder.
+/// Path of the only GPS track in a folder.
 ///
 /// # Errors
-/// [`Error::Config`] where there are several, [`Error::File`].
+/// [`Error::Config`] if there are several, [`Error::File`].
 fn only_track(folder: &Path, config: &FolderConfig) -> Result<Option<PathBuf>> {
     let mut tracks = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
@@ -268,7 +269,7 @@ fn only_track(folder: &Path, config: &FolderConfig) -> Result<Option<PathBuf>> {
     }
 }
 
-/// The speeds of another program's log; how it was understood is added to the warnings.
+/// The speeds in another program's log; notes on how it was interpreted are added to the warnings.
 fn speeds(
     path: &Path,
     log: &DriveLog,
@@ -294,7 +295,7 @@ fn speeds(
     }
 }
 
-/// The turns of another program's log, where it has some.
+/// The yaw rates in another program's log, if any.
 fn turns(rates: &[YawRate]) -> Option<Samples> {
     (!rates.is_empty()).then(|| Samples {
         ns: rates.iter().map(|y| y.ns).collect(),
@@ -302,7 +303,7 @@ fn turns(rates: &[YawRate]) -> Option<Samples> {
     })
 }
 
-/// How sure another program's log is of its speeds, where it says it of some.
+/// The standard deviations of the speeds in another program's log, if any.
 fn sigmas(log: &DriveLog, scale: f64) -> Option<Samples> {
     let known = log.speeds.iter().filter_map(|s| Some((s.ns, s.sigma_mps?)));
     let (ns, values): (Vec<i64>, Vec<f64>) = known.unzip();
@@ -310,7 +311,8 @@ fn sigmas(log: &DriveLog, scale: f64) -> Option<Samples> {
     (!ns.is_empty()).then_some(Samples { ns, values })
 }
 
-/// `course.csv`, which `deepfusion-logs` writes of a track of positions; a table of that name without its column is somebody else's.
+/// Reads `course.csv`, which `deepfusion-logs` writes for a track of positions. A table of that name without its column is another
+/// program's.
 fn course_table(
     folder: &Path,
     config: &FolderConfig,
@@ -339,7 +341,7 @@ fn course_table(
     Ok(Some(Samples { ns, values }))
 }
 
-/// m/s of one unit of the column.
+/// Factor from the column's unit to m/s.
 fn speed_factor(table: &Table, column: &Column, config: &FolderConfig) -> Result<f64> {
     let unit = column.unit.as_deref().or(config.speed_unit.as_deref());
     match unit {
@@ -350,7 +352,7 @@ fn speed_factor(table: &Table, column: &Column, config: &FolderConfig) -> Result
     }
 }
 
-/// rad/s of one unit of the column.
+/// Factor from the column's unit to rad/s.
 fn yaw_factor(table: &Table, column: &Column, config: &FolderConfig) -> Result<f64> {
     let unit = column.unit.as_deref().or(config.yaw_rate_unit.as_deref());
     match unit {

@@ -12,7 +12,7 @@ fn read(files: &[(&str, &str)]) -> Result<SpeedLog> {
     Ok(SpeedLog::read(folder.path(), &config)?.expect("there is a speed.csv"))
 }
 
-/// What its warnings say, a line each.
+/// Its warnings, one per line.
 fn text_of(log: &SpeedLog) -> String {
     let lines: Vec<String> = log.warnings.iter().map(ToString::to_string).collect();
     lines.join("\n")
@@ -61,10 +61,10 @@ fn times_may_be_dates() {
         );
         let log = read(&[("speed.csv", &table)]).unwrap();
         assert_eq!(log.speeds_mps.ns, [start, start + tenth], "{zone}");
-        let said = text_of(&log).contains("taken for UTC");
+        let said = text_of(&log).contains("assuming UTC");
         assert_eq!(said, warned, "{zone}");
     }
-    // Of one column all say their zone, or none.
+    // Either all times in a column have a zone, or none.
     let mixed = "timestamp,speed_mps\n2024-05-01T10:00:00Z,3\n2024-05-01T10:00:01,4\n";
     let error = refusal(&[("speed.csv", mixed)]).to_string();
     assert!(error.contains(":3: column timestamp: "), "{error}");
@@ -79,23 +79,27 @@ fn a_unit_is_never_guessed() {
     assert!(
         error
             .to_string()
-            .contains("nothing says the unit of column speed"),
+            .contains("column speed: no unit of speed is given"),
         "{error}"
     );
     assert!(error.hint().unwrap().contains("speed_kmh"), "{error}");
     let error = refusal(&[("speed.csv", "time,speed_mps\n0,36\n40,36\n80,36\n")]);
     assert!(
-        error.to_string().contains("unit of time of column time"),
+        error
+            .to_string()
+            .contains("column time: no unit of time is given"),
         "{error}"
     );
     let error = refusal(&[("speed.csv", "time_s,speed_mps,yaw_rate\n0,36,0\n")]);
     assert!(
-        error.to_string().contains("unit of column yaw_rate"),
+        error
+            .to_string()
+            .contains("column yaw_rate: no unit of yaw rate is given"),
         "{error}"
     );
     let error = refusal(&[("speed.csv", "time_s,speed (furlong/h)\n0,36\n")]);
     assert!(error.to_string().contains("furlong/h"), "{error}");
-    // A magnitude that can be nothing else is taken, and said.
+    // A unit that follows from the magnitude is used, with a warning.
     let log = read(&[(
         "speed.csv",
         "timestamp,speed_mps\n1403636579763555584,3\n1403636579863555584,3\n",
@@ -103,7 +107,7 @@ fn a_unit_is_never_guessed() {
     let log = log.unwrap();
     assert_eq!(log.speeds_mps.ns[0], 1_403_636_579_763_555_584);
     let said = log.warnings[0].to_string();
-    assert!(said.contains("taken as ns"), "{said}");
+    assert!(said.contains("assuming ns"), "{said}");
 }
 
 #[test]
@@ -128,11 +132,11 @@ fn bad_rows_are_named() {
         ("time_s,speed_mps\n", "no row below the header"),
         (
             "time_s,sped_mps\n0,1\n",
-            "no column 'speed', there is: time_s, sped_mps",
+            "no column 'speed', only time_s, sped_mps",
         ),
         (
             "when,speed_mps\n0,1\n",
-            "no column 'time', there is: when, speed_mps",
+            "no column 'time', only when, speed_mps",
         ),
     ] {
         let error = refusal(&[("speed.csv", text)]).to_string();
@@ -155,8 +159,8 @@ fn repeated_times_and_slow_clocks_are_reported() {
     assert!(!said.contains("gap"), "{said}");
 }
 
-/// A speed a second, as receivers and phones write it, is bridged; a hole in it is not, and one in a fast log neither, unless
-/// `dataset.toml` says so.
+/// One speed per second, as GPS receivers and phones write it, is bridged. A gap in it is not, nor is one in a fast log, unless
+/// `dataset.toml` allows it.
 #[test]
 fn slow_logs_are_bridged() {
     let known = |text: &str, config: &str, at: &[f64]| {
@@ -169,7 +173,7 @@ fn slow_logs_are_bridged() {
     let (speeds, warnings) = known(slow, "", &[0.5, 1.25, 5.0]);
     assert_eq!(speeds, [Some(1.5), Some(1.75), None]);
     assert!(
-        warnings.contains("4 gaps of up to 1.0 s between speeds are bridged"),
+        warnings.contains("speeds are interpolated linearly across 4 gaps of up to 1.0 s"),
         "{warnings}"
     );
     assert!(warnings.contains("1 gap of more than 3.0 s"), "{warnings}");
@@ -208,7 +212,10 @@ fn a_track_stands_for_speeds() {
     let said = text_of(&log);
     assert!(said.contains("from its positions, smoothed"), "{said}");
     let error = refusal(&[("a.gpx", &gpx), ("b.gpx", &gpx)]);
-    assert!(error.to_string().contains("2 tracks are there"), "{error}");
+    assert!(
+        error.to_string().contains("the folder has 2 tracks"),
+        "{error}"
+    );
     let named = read(&[
         ("a.gpx", &gpx),
         ("b.gpx", &gpx),
@@ -238,7 +245,7 @@ fn the_yaw_rate_comes_from_the_imu_on_its_own_clock() {
     ])
     .unwrap();
     assert_eq!(log.streams[1].rate_hz.map(f64::round), Some(100.0));
-    // 18 t degrees a second: 9 t² degrees.
+    // 18 t degrees per second integrate to 9 t² degrees.
     let motion = log.track(0).motion(0.0, 1.0).unwrap();
     assert!(
         (motion.yaw_rad - 9_f64.to_radians()).abs() < 1e-9,
@@ -247,12 +254,12 @@ fn the_yaw_rate_comes_from_the_imu_on_its_own_clock() {
     assert!((motion.distance_m - 5.0).abs() < 1e-9);
 }
 
-/// 10 m/s and 0.2 rad/s to the left for 5 s, read at 100 Hz by a unit that is turned a quarter to the left: its x looks
+/// 10 m/s and 0.2 rad/s to the left for 5 s, measured at 100 Hz by a unit that is rotated by 90° to the left: its x points
 /// to the vehicle's left.
 fn turning_unit(header: &str, rates: f64, accelerations: f64) -> String {
     let mut table = format!("{header}\n");
     for i in 0..=500 {
-        // Centripetal: 2 m/s² to the left; gravity holds the unit up.
+        // Centripetal acceleration is 2 m/s² to the left; the reaction to gravity points up.
         let [ax, ay, az] = [2.0, 0.0, 9.806_65].map(|a| a / accelerations);
         table += &format!(
             "{},0,0,{},{ax},{ay},{az}\n",
@@ -293,7 +300,7 @@ fn a_whole_inertial_unit_is_fused_with_the_speed() {
         assert!((driven.yaw_rad - 0.4).abs() < 0.01, "{driven:?}");
         assert!((driven.distance_m - 20.0).abs() < 0.2, "{driven:?}");
     }
-    // One that hangs upside down is reported, not believed.
+    // A unit that is upside down is an error.
     let upside_down = "[vehicle_from_imu]\nrotation = [3.14159265, 0.0, 0.0]\n";
     let header =
         "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";
@@ -318,7 +325,9 @@ fn units_of_an_inertial_unit_are_never_guessed() {
         ("imu.csv", &unit),
     ]);
     assert!(
-        error.to_string().contains("unit of column accel_x"),
+        error
+            .to_string()
+            .contains("column accel_x: no unit of acceleration is given"),
         "{error}"
     );
     assert!(error.hint().unwrap().contains("accel_x_mps2"), "{error}");
@@ -339,7 +348,7 @@ fn the_course_of_positions_is_read_where_no_yaw_rate_is() {
         "time_s,speed_mps,yaw_rate_radps\n0,10,0\n1,10,0\n",
     );
     assert_eq!(rates(&[with_yaw, course]).0, None);
-    // Somebody's own table of that name stops nothing.
+    // Another program's table of that name is not an error.
     for other in ["lesson,room\nA,1\n", "time_s,course_deg\n0,10\n", ""] {
         let (found, warnings) = rates(&[speed, ("course.csv", other)]);
         assert_eq!(found, None, "{other}");

@@ -1,4 +1,4 @@
-//! Comma-separated tables with a header, read so that every complaint names file, line and column.
+//! Reads comma-separated tables with a header, so that every error names file, line and column.
 
 use crate::{ColumnsProblem, Error, ExpectedCell, Quantity, Result, TableProblem};
 use std::path::{Path, PathBuf};
@@ -10,12 +10,12 @@ pub(crate) struct Table {
     rows: Vec<(u64, csv::StringRecord)>,
 }
 
-/// One column's header, taken apart: `speed_kmh`, `speed [km/h]` and `speed (km/h)` are one.
+/// A column's header, split into name and unit: `speed_kmh`, `speed [km/h]` and `speed (km/h)` are equivalent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Column {
-    /// As the file has it.
+    /// The header as written in the file.
     pub(crate) header: String,
-    /// In lower case, without its unit.
+    /// The name in lower case, without its unit.
     pub(crate) name: String,
     /// The unit, as written.
     pub(crate) unit: Option<String>,
@@ -23,11 +23,10 @@ pub(crate) struct Column {
 }
 
 impl Table {
-    /// Reads a table whose values are apart by commas, semicolons or tabs, whichever its header has.
+    /// Reads a table with values separated by commas, semicolons or tabs, depending on its header.
     ///
     /// # Errors
-    /// [`Error::File`]; [`Error::Table`] where a row has another number of values
-    /// than the header.
+    /// [`Error::File`]; [`Error::Table`] if the number of values in a row differs from that in the header.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         let first = bytes.split(|b| *b == b'\n').next().unwrap_or(&[]);
@@ -61,7 +60,7 @@ impl Table {
         for row in reader.into_records() {
             let row = row.map_err(refused)?;
             let line = row.position().map_or(0, |at| {
-                // A record's place is before the empty lines above it.
+                // A record's position is before the empty lines above it.
                 let from = bytes.get(at.byte() as usize..).unwrap_or(&[]);
                 let empty = from.iter().take_while(|b| b"\r\n".contains(b));
                 at.line() + empty.filter(|b| **b == b'\n').count() as u64
@@ -71,13 +70,13 @@ impl Table {
         Ok(table)
     }
 
-    /// The first column of one of these names.
+    /// The first column with one of these names.
     pub(crate) fn column(&self, names: &[&str]) -> Option<&Column> {
         let named = |c: &&Column| names.contains(&c.name.as_str());
         self.columns.iter().find(named)
     }
 
-    /// As [`Self::column`], or an error that lists what there is.
+    /// [`Self::column`], or an error that lists the existing columns.
     pub(crate) fn require(&self, names: &[&str], example: &'static str) -> Result<&Column> {
         self.column(names).ok_or_else(|| {
             self.lacks(ColumnsProblem::NoColumn {
@@ -96,7 +95,7 @@ impl Table {
         }
     }
 
-    /// An error about a column whose unit is not known, or not said.
+    /// An error about a column with an unknown or missing unit.
     pub(crate) fn no_unit(&self, quantity: Quantity, column: &Column, unit: Option<&str>) -> Error {
         self.lacks(match unit {
             Some(unit) => ColumnsProblem::UnknownUnit {
@@ -110,12 +109,12 @@ impl Table {
         })
     }
 
-    /// How many rows there are.
+    /// Number of rows.
     pub(crate) fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// The words of a column, row by row.
+    /// The cells of a column, row by row.
     pub(crate) fn words<'a>(&'a self, column: &'a Column) -> impl Iterator<Item = &'a str> {
         let word = |row: &'a (u64, csv::StringRecord)| row.1.get(column.index).unwrap_or("");
         self.rows.iter().map(word)
@@ -135,7 +134,7 @@ impl Table {
         words.map(number).collect()
     }
 
-    /// An error about a value, by row counted from 0.
+    /// An error about a value; rows are counted from 0.
     pub(crate) fn bad(&self, row: usize, column: &Column, problem: TableProblem) -> Error {
         Error::Table {
             path: self.path.clone(),
@@ -169,7 +168,7 @@ impl Column {
     }
 }
 
-/// A name and the unit behind its last underscore.
+/// Splits a name from the unit after its last underscore.
 fn with_suffix(text: &str) -> (&str, Option<&str>) {
     const UNITS: [&str; 21] = [
         "s", "sec", "ms", "us", "ns", "mps", "kmh", "kph", "mph", "radps", "dps", "degps", "mps2",
@@ -218,12 +217,12 @@ mod tests {
         );
         let error = table.require(&["yaw_rate"], "x").map(|_| ()).unwrap_err();
         assert!(
-            error.to_string().contains("there is: time_s, speed_mps"),
+            error.to_string().contains("only time_s, speed_mps"),
             "{error}"
         );
         let error = read("a,b\n1,2\n1\n").map(|_| ()).unwrap_err().to_string();
         assert!(
-            error.contains(":3:") && error.contains("1 value, the header has 2"),
+            error.contains(":3:") && error.contains("1 value, but the header has 2"),
             "{error}"
         );
     }

@@ -1,4 +1,4 @@
-//! The column of times of a table.
+//! Reads a table's column of times.
 
 use super::clock::{TimeUnit, seconds};
 use super::table::{Column, Table};
@@ -8,10 +8,10 @@ use deepfusion_logs::parse_date;
 
 pub(super) const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
 
-/// How a column's times are written.
+/// The form of a column's times.
 enum TimeStyle {
     Numbers(TimeUnit),
-    /// All with their zone, or all without.
+    /// Dates, all with a time zone or all without.
     Dates {
         zoned: bool,
     },
@@ -29,7 +29,7 @@ impl TimeStyle {
     }
 }
 
-/// How the times of a column are written: dates where the first is one, of which those without a zone are warned of, else numbers.
+/// The form of a column's times: dates if the first is one, otherwise numbers. Warns about dates without a time zone.
 fn style_of(
     table: &Table,
     column: &Column,
@@ -66,7 +66,7 @@ fn style_of(
     })
 }
 
-/// The table's times in nanoseconds, which must rise; equal ones are warned of once.
+/// The table's times in nanoseconds, which must increase; repeated times give a warning.
 pub(crate) fn times(
     table: &Table,
     config: &FolderConfig,

@@ -1,4 +1,4 @@
-//! An inertial unit's and a steering wheel's recording beside the speeds, and the motion that follows from all of them.
+//! Inertial unit and steering angle recorded with the speeds, and the motion computed from all of them.
 
 use super::clock::seconds;
 use super::samples::Samples;
@@ -7,7 +7,7 @@ use crate::{MotionModel, Quantity, Result};
 use deepfusion_motion::{FusedTrack, ImuSample, MotionConfig, Signal, VehicleSensors};
 use nalgebra::Vector3;
 
-/// What a column of an axis may be called, before `_x`, `_y` or `_z`; and short names of the three.
+/// Possible names of the columns, before `_x`, `_y` or `_z`, and short names for the three axes.
 const RATES: ([&str; 3], [&str; 3]) = (["gyro", "angular_velocity", "omega"], ["wx", "wy", "wz"]);
 const ACCELERATIONS: ([&str; 4], [&str; 3]) = (
     ["accel", "acc", "acceleration", "linear_acceleration"],
@@ -16,23 +16,23 @@ const ACCELERATIONS: ([&str; 4], [&str; 3]) = (
 /// Standard gravity, m/s².
 const GRAVITY_MPS2: f64 = 9.806_65;
 
-/// What else than its speed a vehicle recorded, on the recording's clock.
+/// A vehicle's measurements other than speed, on the recording's clock.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct VehicleLog {
-    /// Readings by time in nanoseconds; a sample's own time is not set.
+    /// Samples with their times in nanoseconds; the samples' own time is not set.
     pub(crate) imu: Vec<(i64, ImuSample)>,
-    /// Positive to the left.
+    /// Steering angle, positive to the left.
     pub(crate) steering_rad: Option<Samples>,
-    /// Mounts, the vehicle's geometry, weights.
+    /// Mounts, the vehicle's geometry and weights.
     pub(crate) config: MotionConfig,
 }
 
 impl VehicleLog {
-    /// The motion by speed, inertial unit and steering, on a clock that starts at `origin_ns`; and whether its turns are
+    /// The motion from speed, inertial unit and steering, on a clock that starts at `origin_ns`, and whether its turns are
     /// known.
     ///
     /// # Errors
-    /// [`deepfusion_motion::Error`] for sensors that cannot be read as configured, or contradict each other.
+    /// [`deepfusion_motion::Error`] for sensors that cannot be used as configured, or contradict each other.
     pub(crate) fn motion(
         &self,
         speeds_mps: &Samples,
@@ -57,10 +57,10 @@ impl VehicleLog {
     }
 }
 
-/// The readings of a table that has all three rates and all three accelerations; `None` where it does not.
+/// The samples in a table that has all three rates and all three accelerations; `None` if it does not.
 ///
 /// # Errors
-/// [`crate::Error::Columns`] for a column whose unit is not said or known, [`crate::Error::Table`] for a bad value.
+/// [`crate::Error::Columns`] for a column with a missing or unknown unit, [`crate::Error::Table`] for an invalid value.
 pub(crate) fn imu_readings(
     table: &Table,
     ns: &[i64],
@@ -76,7 +76,7 @@ pub(crate) fn imu_readings(
     let at = |axes: &[Vec<f64>; 3], row: usize| Vector3::from([0, 1, 2].map(|i| axes[i][row]));
     let mut readings: Vec<(i64, ImuSample)> = Vec::with_capacity(ns.len());
     for (row, ns) in ns.iter().enumerate() {
-        // Of rows with one time the first counts, as in every table.
+        // Of rows with the same time the first counts, as in every table.
         if readings.last().is_some_and(|(last, _)| last == ns) {
             continue;
         }
@@ -90,7 +90,7 @@ pub(crate) fn imu_readings(
     Ok(Some(readings))
 }
 
-/// The columns of the three axes, under one of the names.
+/// The columns of the three axes with one of the names.
 fn axes<'a>(table: &'a Table, names: &[&str], short: &[&str; 3]) -> Option<[&'a Column; 3]> {
     let find = |axis: usize| {
         let long = names
@@ -116,7 +116,7 @@ fn values(
     Ok(all)
 }
 
-/// m/s² of one unit of the column.
+/// Factor from the column's unit to m/s².
 fn acceleration_factor(table: &Table, column: &Column) -> Result<f64> {
     match column.unit.as_deref() {
         Some("mps2" | "m/s2" | "m/s^2" | "m/s²") => Ok(1.0),

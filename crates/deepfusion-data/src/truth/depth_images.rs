@@ -1,4 +1,4 @@
-//! Folders of depth images.
+//! Reads folders of depth images.
 
 use crate::{Error, ImageProblem, Result};
 use deepfusion_geometry::DepthMap;
@@ -7,18 +7,18 @@ use image::DynamicImage;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Depth images by frame number, and what their values mean.
+/// Depth images by frame number, and the meaning of their values.
 #[derive(Debug, Clone)]
 pub(crate) struct DepthImages {
     pub(crate) files: BTreeMap<u64, PathBuf>,
-    /// Metres of one step.
+    /// Metres per unit of the values.
     pub(crate) unit_m: f64,
-    /// A value besides 0 that means none.
+    /// A value besides 0 that means no depth.
     pub(crate) invalid: Option<u16>,
 }
 
 impl DepthImages {
-    /// A 16-bit grey PNG as metres.
+    /// Reads a 16-bit grey PNG as depth in metres.
     pub(crate) fn read(&self, path: &Path) -> Result<DepthMap> {
         let DynamicImage::ImageLuma16(image) = decode(path)? else {
             return Err(Error::Image {

@@ -1,4 +1,4 @@
-//! Where a recording's measured depth is: images of it, or scans.
+//! A recording's measured depth: depth images or scans.
 
 use super::depth_images::DepthImages;
 use super::scan::GtKind;
@@ -20,25 +20,25 @@ pub(crate) enum MeasuredDepth {
 /// A LiDAR's scans by frame number.
 #[derive(Debug, Clone)]
 pub(crate) struct Scans {
-    /// The sensor's or its folder's name.
+    /// Name of the sensor or its folder.
     pub(crate) name: &'static str,
     /// Reads a file as points in metres: x forward, y left, z up.
     pub(crate) read: fn(&Path) -> deepfusion_geometry::cloud::Result<PointCloud>,
     pub(crate) files: BTreeMap<u64, PlacedScan>,
-    /// When they were taken, in seconds; empty where that is not known.
+    /// Times of the scans, in seconds; empty if unknown.
     pub(crate) times_s: Vec<f64>,
 }
 
-/// A scan, and where it was when the frame was taken.
+/// A scan, with its projection into its frame.
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedScan {
     pub(crate) file: PathBuf,
-    /// Homogeneous pixels and camera z from a point.
+    /// Projection from a point to homogeneous pixels and camera z.
     pub(crate) pixels_from_scan: Matrix3x4<f64>,
 }
 
 impl PlacedScan {
-    /// A scan of a frame whose camera has these intrinsics and sees a point of the scan there.
+    /// The scan of a frame with these intrinsics, at `cam_from_scan`.
     pub(crate) fn new(file: PathBuf, camera: &Intrinsics, cam_from_scan: &Se3) -> Self {
         let motion = cam_from_scan.matrix();
         Self {
@@ -48,8 +48,8 @@ impl PlacedScan {
     }
 }
 
-/// The scans of a velodyne in a folder, `0000000000.bin` and so on, of the frames that have images; `None` without one. `cam_from_velo`
-/// is asked only where there are some.
+/// The velodyne scans in a folder (`0000000000.bin` and so on) for frames that have images; `None` without scans, in which case
+/// `cam_from_velo` is not called.
 ///
 /// # Errors
 /// [`Error::File`], and those of `cam_from_velo`.
@@ -76,7 +76,7 @@ pub(crate) fn velodyne(
 }
 
 impl MeasuredDepth {
-    /// What was recorded.
+    /// The stream of depth images or scans.
     pub(crate) fn stream(&self) -> Stream {
         match self {
             Self::Images(images) => Stream::new("depth", "depth", images.files.len(), &[]),
@@ -94,7 +94,7 @@ impl MeasuredDepth {
         }
     }
 
-    /// The depth of a frame at the size of its images; `drive` is named in errors.
+    /// The depth of a frame at the size of its images; errors name `drive`.
     pub(crate) fn of(
         &self,
         frame: u64,

@@ -1,4 +1,4 @@
-//! Measured depth: what it means, which pixels are dynamic, and images of it.
+//! Measured depth: its kinds, its dynamic pixels, and pictures of it.
 
 pub(crate) mod depth_images;
 pub(crate) mod measured;

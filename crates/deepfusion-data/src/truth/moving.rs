@@ -1,4 +1,4 @@
-//! Which pixels of a frame's ground truth belong to dynamic objects, which move over the ground.
+//! Labels of the pixels of a frame's ground truth that belong to dynamic objects, which move over the ground.
 
 use super::scan::GtKind;
 use crate::Result;
@@ -7,17 +7,17 @@ use serde::Serialize;
 use std::fmt;
 use std::sync::Arc;
 
-/// Where moving labels come from.
+/// Source of the labels of dynamic pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MovingSource {
     /// The simulator's exact masks.
     Masks,
-    /// KITTI's tracklets, moving where their box moves over the ground.
+    /// KITTI's tracklets whose boxes move over the ground.
     Tracklets,
     /// Radial velocities of a frequency-modulated LiDAR.
     RadialVelocity,
-    /// A topic with the points of a scan that move, beside a LiDAR without velocities.
+    /// A topic with the dynamic points of a scan, for a LiDAR without velocities.
     DynamicPoints,
 }
 
@@ -28,17 +28,17 @@ pub struct MovingLabels {
     moving: Arc<dyn MovingPixels>,
 }
 
-/// Finds the dynamic pixels of a frame's ground truth; one implementation a source of labels.
+/// Finds the dynamic pixels of a frame's ground truth; each source of labels has an implementation.
 pub trait MovingPixels: fmt::Debug + Send + Sync {
-    /// As [`MovingLabels::pixels`].
+    /// See [`MovingLabels::pixels`].
     ///
     /// # Errors
-    /// Where the labels cannot be read, or do not fit the ground truth.
+    /// If the labels cannot be read, or do not fit the ground truth.
     fn pixels(&self, frame: u64, truth: &DepthMap, kind: GtKind) -> Result<Option<Vec<bool>>>;
 }
 
 impl MovingLabels {
-    /// Labels of a source.
+    /// Labels from a source.
     #[must_use]
     pub fn new(source: MovingSource, moving: impl MovingPixels + 'static) -> Self {
         Self {
@@ -54,10 +54,10 @@ impl MovingLabels {
     }
 
     /// Which pixels of a frame's ground truth (at the image's size) move, row by row; `None` for a
-    /// frame without a mask. A tracklet's box takes the pixels whose point in space lies inside it.
+    /// frame without a mask. A tracklet's box includes the pixels whose 3D point lies inside it.
     ///
     /// # Errors
-    /// As [`crate::load_rgb`]; [`crate::Error::Size`] where the mask has another size than the ground truth.
+    /// Those of [`crate::load_rgb`]; [`crate::Error::Size`] if the mask's size differs from the ground truth's.
     pub fn pixels(&self, frame: u64, truth: &DepthMap, kind: GtKind) -> Result<Option<Vec<bool>>> {
         self.moving.pixels(frame, truth, kind)
     }

@@ -1,15 +1,15 @@
-//! Sparse depth drawn on its image, to see by eye whether calibration and time stamps fit.
+//! Draws sparse depth on its image, for checking calibration and time stamps by eye.
 
 use crate::{Error, Result};
 use deepfusion_geometry::DepthMap;
 use image::{Rgb, RgbImage};
 
-/// Depths at the two ends of the colours, in metres: red is near, blue is far.
+/// Depths at the two ends of the colour scale, in metres: red is near, blue is far.
 const NEAR_M: f32 = 3.0;
 const FAR_M: f32 = 60.0;
 
-/// The image with every depth as a 2×2 dot, near ones red over yellow, green to far ones blue (by the
-/// logarithm of depth), near dots over far ones.
+/// The image with every depth as a 2×2 dot, coloured by the logarithm of depth from red (near) over yellow and
+/// green to blue (far); near dots cover far ones.
 ///
 /// # Errors
 /// [`Error::Size`] if the two sizes differ.

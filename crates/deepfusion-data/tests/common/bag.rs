@@ -1,4 +1,4 @@
-//! A small bag: grey pictures, and whatever a test's vehicle says.
+//! A small bag with grey images and the messages that a test needs.
 
 use deepfusion_rosbag::msg::{
     AckermannDriveStamped, CameraInfo, Float32, Frame, Header, Image, Imu, NavSatFix, NavSatStatus,
@@ -12,21 +12,21 @@ use std::path::Path;
 
 /// Messages of each stream, 40 ms apart.
 const COUNT: u32 = 25;
-/// The pictures' size: one that `[camera]` in [`CAMERA`] fits.
+/// Size of the images, as in [`CAMERA`].
 const SIZE: (u32, u32) = (64, 48);
 
-/// A camera for the pictures.
+/// A camera for the images.
 pub(crate) const CAMERA: &str =
     "camera = { fx = 60.0, fy = 60.0, cx = 32.0, cy = 24.0, width = 64, height = 48 }\n";
 
-/// A bag being written, how many streams it has, whether the headers of the next have a time, and which frame.
+/// A bag being written, with the number of its streams, and whether and with which frame the next stream's headers have a time.
 pub(crate) struct TinyBag(BagWriter, u32, bool, String);
 
-/// Each stream begins this long after the one before: of two values at one time, only one would be read.
+/// Each stream begins this long after the previous one, because only one of two values at the same time would be read.
 const SHIFT_NS: u32 = 3_000_000;
 
 impl TinyBag {
-    /// A bag with pictures on `image`.
+    /// A bag with images on the topic `image`.
     pub(crate) fn new(path: &Path, image: &str) -> Self {
         let mut bag = Self(
             BagWriter::create(path, WriterOptions::default()).unwrap(),
@@ -44,7 +44,7 @@ impl TinyBag {
         Self(writer, 0, true, String::new())
     }
 
-    /// Pictures.
+    /// Adds images.
     pub(crate) fn images(&mut self, topic: &str) -> &mut Self {
         self.stream(topic, |header| Image {
             header,
@@ -57,13 +57,13 @@ impl TinyBag {
         })
     }
 
-    /// From here on every header has this frame.
+    /// Sets the frame of all following headers.
     pub(crate) fn within(&mut self, frame: &str) -> &mut Self {
         frame.clone_into(&mut self.3);
         self
     }
 
-    /// The pictures' camera, of a focal length in pixels.
+    /// Adds the images' CameraInfo with a focal length in pixels.
     pub(crate) fn camera_info(&mut self, topic: &str, focal: f64) -> &mut Self {
         self.stream(topic, |header| CameraInfo {
             header,
@@ -80,7 +80,7 @@ impl TinyBag {
         })
     }
 
-    /// Scans of one point, 10 m along x.
+    /// Adds scans of one point, 10 m along x.
     pub(crate) fn scans(&mut self, topic: &str) -> &mut Self {
         self.stream(topic, |header| {
             let columns: [(&str, &[f32]); 3] = [("x", &[10.0]), ("y", &[0.0]), ("z", &[0.0])];
@@ -88,7 +88,7 @@ impl TinyBag {
         })
     }
 
-    /// The same with the point's own time in a field `time`, in seconds after the header's.
+    /// Adds the same scans with the point's own time in a field `time`, in seconds after the header's.
     pub(crate) fn timed_scans(&mut self, topic: &str, after_s: f32) -> &mut Self {
         self.stream(topic, |header| {
             let columns: [(&str, &[f32]); 4] = [
@@ -101,8 +101,8 @@ impl TinyBag {
         })
     }
 
-    /// Frames in frames: parent, child, the child's origin in the parent and its turn about an axis in radians; the `i`th of
-    /// the messages by `at(i)`.
+    /// Adds transforms: parent, child, the child's origin in the parent and its rotation as an axis-angle vector in radians; `at(i)` gives
+    /// those of the `i`th message.
     pub(crate) fn transforms(
         &mut self,
         topic: &str,
@@ -142,7 +142,7 @@ impl TinyBag {
         })
     }
 
-    /// Satellite positions on the equator, to the east at a speed.
+    /// Adds GPS positions along the equator, moving east at a speed.
     pub(crate) fn fixes(&mut self, topic: &str, speed_mps: f64) -> &mut Self {
         let count = std::cell::Cell::new(0_u32);
         self.stream(topic, |header| {
@@ -154,7 +154,7 @@ impl TinyBag {
                     service: 1,
                 },
                 latitude: 0.0,
-                // A degree is 111,319.49 m there.
+                // A degree of longitude is 111,319.49 m there.
                 longitude: 8.0 + speed_mps * time_s / 111_319.490_793,
                 altitude: 0.0,
                 position_covariance: [0.0; 9],
@@ -181,7 +181,7 @@ impl TinyBag {
         self.turning_twist(topic, |_| (speed_mps, 0.0))
     }
 
-    /// Speed in m/s and yaw rate in rad/s by seconds from the bag's first picture.
+    /// Adds a twist whose speed in m/s and yaw rate in rad/s are functions of the seconds since the bag's first image.
     pub(crate) fn turning_twist(
         &mut self,
         topic: &str,
@@ -201,8 +201,8 @@ impl TinyBag {
         })
     }
 
-    /// A satellite receiver's velocity, to the east (x) and to the north (y): of a constant speed, m/s, on courses from the east to the left
-    /// in radians, by the message's number.
+    /// Adds a GPS receiver's velocity, east (x) and north (y), with a constant speed, m/s, and a course in radians, counter-clockwise from
+    /// east, as a function of the message's number.
     pub(crate) fn course_twist(
         &mut self,
         topic: &str,
@@ -221,7 +221,7 @@ impl TinyBag {
         })
     }
 
-    /// A twist with rates about all three axes, rad/s.
+    /// Adds a twist with rates about all three axes, rad/s.
     pub(crate) fn tumbling_twist(
         &mut self,
         topic: &str,
@@ -239,12 +239,12 @@ impl TinyBag {
         })
     }
 
-    /// An inertial unit that lies flat and turns to the left, rad/s.
+    /// Adds an inertial unit that lies flat and turns to the left, rad/s.
     pub(crate) fn imu(&mut self, topic: &str, yaw_rate: f64) -> &mut Self {
         self.imu_along_z(topic, yaw_rate, 9.81)
     }
 
-    /// An inertial unit that measures a rate about its z in rad/s, and an acceleration along it in m/s².
+    /// Adds an inertial unit that measures a rate about its z in rad/s, and an acceleration along it in m/s².
     pub(crate) fn imu_along_z(&mut self, topic: &str, rate: f64, acceleration: f64) -> &mut Self {
         let up = |z| Vector3 {
             z,
@@ -261,7 +261,7 @@ impl TinyBag {
         })
     }
 
-    /// An inertial unit that says by a covariance of −1 that it has no angular rates, whatever stands there.
+    /// Adds an inertial unit with a covariance of −1, which marks its angular rates as missing, whatever their values.
     pub(crate) fn accelerometer(&mut self, topic: &str) -> &mut Self {
         self.stream(topic, |header| {
             let mut no_rates = [0.0; 9];
@@ -282,14 +282,14 @@ impl TinyBag {
         })
     }
 
-    /// From here on no header says when its message was measured.
+    /// Leaves out the time in all following headers.
     pub(crate) fn without_stamps(&mut self) -> &mut Self {
         self.2 = false;
         self
     }
 
-    /// An odometry without a twist: on a circle to the left from the world's x on, at a speed (m/s) and a yaw rate (rad/s), with its
-    /// attitude turned by so much (radians) from the way it goes.
+    /// Adds an odometry without a twist: on a circle to the left, starting along the world's x, at a speed (m/s) and a yaw rate (rad/s),
+    /// with its heading rotated by an angle (radians) from the direction of travel.
     pub(crate) fn poses(
         &mut self,
         topic: &str,
@@ -361,7 +361,7 @@ impl TinyBag {
         self.stream(topic, |_| Float32 { data })
     }
 
-    /// Frames of one identifier, all alike but for their time.
+    /// Adds CAN frames with one identifier, identical except for their time.
     pub(crate) fn can(&mut self, topic: &str, frame: &Frame) -> &mut Self {
         self.stream(topic, |header| Frame {
             header,

@@ -4,14 +4,14 @@ use image::{Rgb, RgbImage};
 use std::fs;
 use std::path::Path;
 
-/// The image of a frame, as `TinyDrive` has it.
+/// The image of a frame, the same as in `TinyDrive`.
 pub(crate) fn picture(n: u64) -> RgbImage {
     RgbImage::from_fn(62, 19, |x, y| {
         Rgb([(x * 4) as u8, (y * 13) as u8, (n * 30) as u8])
     })
 }
 
-/// Writes `images/<name>.png` for each.
+/// Writes `images/<name>.png` for each name.
 pub(crate) fn write_images(folder: &Path, names: &[&str]) {
     fs::create_dir_all(folder.join("images")).unwrap();
     for (n, name) in names.iter().enumerate() {
@@ -20,7 +20,7 @@ pub(crate) fn write_images(folder: &Path, names: &[&str]) {
     }
 }
 
-/// A folder of `frames` images at 0.103 s, at `speed_mps` with a yaw rate; the camera of `TinyDrive`.
+/// A folder of `frames` images, one every 0.103 s, at `speed_mps` with a yaw rate, and the camera of `TinyDrive`.
 pub(crate) fn write_drive(folder: &Path, frames: u64, speed_mps: f64, yaw_rate_radps: f64) {
     let names: Vec<String> = (0..frames).map(|n| format!("{n:06}")).collect();
     write_images(

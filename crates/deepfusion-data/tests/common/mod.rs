@@ -1,4 +1,4 @@
-//! Drives for the tests: tiny ones written here, and real ones where they are on the machine.
+//! Drives for the tests: tiny ones written here, and real ones if available.
 
 pub(crate) mod bag;
 pub(crate) mod folder;
@@ -10,7 +10,7 @@ use image::{Rgb, RgbImage};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// KITTI's calibration of 2011_09_26 in spirit: rounder numbers, a smaller image, cameras 2 and 3 half a
+/// A calibration similar to KITTI's of 2011_09_26, with rounder numbers, a smaller image, and cameras 2 and 3 half a
 /// metre apart (t = P₄ / f: 0.06 m and -0.47 m).
 pub(crate) const CAM_TO_CAM: &str = "calib_time: 09-Jan-2012 13:57:47\n\
 S_rect_02: 6.200000e+01 1.900000e+01\n\
@@ -27,7 +27,7 @@ pub(crate) const IMU_TO_VELO: &str = "calib_time: 25-May-2012 16:47:16\n\
 R: 9.999976e-01 7.553071e-04 -2.035826e-03 -7.854027e-04 9.998898e-01 -1.482298e-02 2.024406e-03 1.482454e-02 9.998881e-01\n\
 T: -8.086759e-01 3.195559e-01 -7.997231e-01\n";
 
-/// A drive to write: every frame the same speed and yaw rate unless changed afterwards.
+/// A drive to write. All frames have the same speed and yaw rate, unless changed afterwards.
 pub(crate) struct TinyDrive {
     pub frames: Vec<u64>,
     pub lines: usize,
@@ -122,14 +122,14 @@ pub(crate) fn packet(speed_mps: f64, yaw_rate_radps: f64) -> String {
     words.join(" ")
 }
 
-/// What warnings say, a line each.
+/// The warnings, one per line.
 pub(crate) fn text_of(warnings: &[DataWarning]) -> String {
     let lines: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     lines.join("\n")
 }
 
-/// A folder of real recordings: below `DEEPFUSION_DATA`, or `../shared/data` beside the workspace. Says
-/// so and gives nothing where it is absent.
+/// A folder of real recordings below `DEEPFUSION_DATA`, or `../shared/data` beside the workspace. If it is
+/// missing, prints that and returns `None`.
 pub(crate) fn real_data(inner: &str) -> Option<PathBuf> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = std::env::var_os("DEEPFUSION_DATA")
@@ -139,13 +139,13 @@ pub(crate) fn real_data(inner: &str) -> Option<PathBuf> {
         return Some(path);
     }
     eprintln!(
-        "skipped: {} is not there (set DEEPFUSION_DATA)",
+        "skipped: {} does not exist (set DEEPFUSION_DATA)",
         path.display()
     );
     None
 }
 
-/// The real drive again with its forward speeds multiplied, images as links.
+/// A copy of a real drive with its forward speeds multiplied by a factor, and links to its images.
 #[cfg(unix)]
 pub(crate) fn copy_with_speeds(drive: &Path, to: &Path, factor: f64) -> PathBuf {
     let link = |from: PathBuf, to: PathBuf| std::os::unix::fs::symlink(from, to).unwrap();

@@ -1,4 +1,4 @@
-//! A small drive of the simulator, whose motion, camera and depth are known, for tests that write it in another layout.
+//! A small simulated drive with known motion, camera and depth, for tests that write it in another layout.
 
 use deepfusion_data::{Dataset, Error, GtKind, OpenOptions};
 use deepfusion_geometry::Se3;
@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use std::fs;
 use std::path::Path;
 
-/// A street of some frames, 320×96.
+/// A street with this many frames of 320×96.
 pub(crate) fn street(frames: usize, fps: f64) -> Simulation {
     let config = SimConfig {
         seed: 12,
@@ -22,24 +22,24 @@ pub(crate) fn street(frames: usize, fps: f64) -> Simulation {
     Simulation::new(&config).unwrap()
 }
 
-/// What lies at a path, as it is opened by default.
+/// The data sets at a path, opened with default options.
 pub(crate) fn open(path: &Path) -> Result<Vec<Dataset>, Error> {
     Dataset::open(path, &OpenOptions::default())
 }
 
-/// Writes a file, its folders too.
+/// Writes a file, and creates its folders.
 pub(crate) fn write(path: &Path, bytes: impl AsRef<[u8]>) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     fs::write(path, bytes).unwrap();
 }
 
-/// Writes the picture of a frame as a PNG.
+/// Writes a frame's image as a PNG.
 pub(crate) fn write_picture(street: &Simulation, frame: usize, path: &Path) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     street.frame(frame).rgb.save(path).unwrap();
 }
 
-/// Writes a scan as KITTI does.
+/// Writes a scan in KITTI's format.
 pub(crate) fn write_scan(street: &Simulation, frame: usize, path: &Path) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     let cloud = street.velodyne(frame);
@@ -48,25 +48,25 @@ pub(crate) fn write_scan(street: &Simulation, frame: usize, path: &Path) {
         .unwrap();
 }
 
-/// Numbers as KITTI prints them.
+/// Numbers in KITTI's format.
 pub(crate) fn numbers(values: impl IntoIterator<Item = f64>) -> String {
     let words: Vec<String> = values.into_iter().map(|v| format!("{v:.12e}")).collect();
     words.join(" ")
 }
 
-/// The upper three rows of a motion's matrix.
+/// The upper three rows of a transform's matrix.
 pub(crate) fn rows(pose: &Se3) -> Vec<f64> {
     let matrix = pose.matrix();
     (0..12).map(|i| matrix[(i / 4, i % 4)]).collect()
 }
 
-/// The camera against the simulator's, to the digits that the files have.
+/// Compares the camera with the simulator's, to the precision of the files.
 pub(crate) fn check_intrinsics(dataset: &Dataset, street: &Simulation) {
     let (read, exact) = (dataset.intrinsics(0).matrix(), street.intrinsics().matrix());
     assert!((read - exact).amax() < 1e-9, "{read} not {exact}");
 }
 
-/// The camera's place on the unit against the simulator's.
+/// Compares the camera's mount on the unit with the simulator's.
 pub(crate) fn check_mount(dataset: &Dataset, street: &Simulation) {
     let off = dataset.cam_from_vehicle().unwrap().inverse() * street.rig().cam_from_imu();
     assert!(
@@ -75,11 +75,12 @@ pub(crate) fn check_mount(dataset: &Dataset, street: &Simulation) {
     );
 }
 
-/// The frames' motion as a data set has it against the simulator's; `frame_of` is the simulator's number of a frame's index. Speeds
-/// are the unit's over the rear axle.
+/// Compares the frames' motion in a data set with the simulator's; `frame_of` gives the simulator's frame number for an index. Speeds
+/// are those of the unit above the rear axle.
 ///
-/// At 10 Hz the car's acceleration changes by up to some m/s³: a central difference is then off by jerk · (0.1 s)² / 6, below a
-/// centimetre a second, and as much again for the bounce that the speed does not see. The arc knows no bounce (1.5 cm within a second or so, 1 cm a frame) and no slip.
+/// With a jerk of up to a few m/s³, a central difference at 10 Hz is off by jerk · (0.1 s)² / 6, below 1 cm/s, and by as much again for
+/// the vehicle's bounce, which the speed does not include. The arc includes neither bounce (1.5 cm within about a second, 1 cm per frame)
+/// nor slip.
 pub(crate) fn check_motion(
     dataset: &Dataset,
     street: &Simulation,
@@ -127,7 +128,7 @@ pub(crate) fn check_motion(
     );
 }
 
-/// How fast the unit's heading turns about the vertical between the frames beside one.
+/// The unit's yaw rate about the vertical between the frames before and after one.
 fn heading_rate(street: &Simulation, frame: usize) -> f64 {
     let heading = |frame: usize| {
         let ahead = street.world_from_imu(frame).rotate(&Vector3::x());
@@ -137,8 +138,8 @@ fn heading_rate(street: &Simulation, frame: usize) -> f64 {
     (heading(after) - heading(before)) / (street.time_s(after) - street.time_s(before))
 }
 
-/// Truth of a frame by the scan against the simulator's exact depth. The scanner sees from another place: at silhouettes a pixel has
-/// the depth of what is behind; its ranges have a noise of 2 cm. So most pixels agree to 2 %, not all.
+/// Compares a frame's ground truth from the scan with the simulator's exact depth. The scanner has another viewpoint, so at silhouettes a
+/// pixel may have the depth of the background, and its ranges have a noise of 2 cm. So most pixels agree to 2 %, but not all.
 pub(crate) fn check_truth(dataset: &Dataset, index: usize, exact: &deepfusion_geometry::DepthMap) {
     let truth = dataset.ground_truth(index, GtKind::Z).unwrap().unwrap();
     assert_eq!((truth.width, truth.height), (exact.width, exact.height));
@@ -153,7 +154,7 @@ pub(crate) fn check_truth(dataset: &Dataset, index: usize, exact: &deepfusion_ge
     assert!(share > 0.85, "{share} of {} pixels", known.len());
 }
 
-/// Path against the simulator's, from the first frame's place.
+/// Compares the path with the simulator's, relative to the first frame.
 pub(crate) fn check_path(
     dataset: &Dataset,
     street: &Simulation,
@@ -169,7 +170,7 @@ pub(crate) fn check_path(
     for (i, pose) in path.world_from_cam.iter().enumerate() {
         let exact = exact_first * street.world_from_cam(frame_of(i));
         let off = (first * *pose).inverse() * exact;
-        // The files' twelve digits of places of some hundred metres.
+        // The files have twelve digits, for positions of some hundred metres.
         assert!(
             off.translation().norm() < 1e-6 && off.angle() < 1e-6,
             "{i}: {off:?}"

@@ -66,7 +66,7 @@ def transform(ns, parent, child, parent_from_child):
 
 
 def chain(names, parent_from_last):
-    """Links along frames whose product is a transform; those in between are anywhere."""
+    """Links along a chain of frames whose product is a given transform; the frames in between are arbitrary."""
     rng = np.random.default_rng(len(names))
     links, so_far = [], np.eye(4)
     for parent, child in zip(names, names[1:]):
@@ -164,7 +164,7 @@ def main(path):
         "cam_from_vehicle": np.linalg.inv(vehicle_from_cam).tolist(),
         "cam_from_lidar": cam_from_lidar.tolist(),
         "vehicle_from_imu": vehicle_from_imu.tolist(),
-        # Of the exact path, at its own times.
+        # The exact path, at its own times.
         "speeds": [[int(ns), speed] for ns, _, _, speed in poses],
         "images": counts["/camera/image_rect/compressed"] // 5 + 1,
     }

@@ -32,7 +32,7 @@ TYPES = ROS2.types
 
 
 def packets():
-    """One packet a picture, told apart by the unit that x264 puts in front of each."""
+    """One packet per picture, split at the unit that x264 puts before each."""
     raw = b"".join(bytes((20 * n, 120, max(200 - 20 * n, 0))) * (WIDTH * HEIGHT) for n in range(FRAMES))
     command = (
         f"ffmpeg -v error -f rawvideo -pix_fmt rgb24 -s {WIDTH}x{HEIGHT} -r 10 -i - -pix_fmt yuv420p -c:v libx264 -qp 8 -bf 0 -g 5 "

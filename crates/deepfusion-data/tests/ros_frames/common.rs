@@ -1,4 +1,4 @@
-//! Small bags, and what is asked of their recordings.
+//! Small bags, and checks of their recordings.
 
 use crate::common::bag::TinyBag;
 use deepfusion_data::{Dataset, Error, NamedTopic, OpenOptions};
@@ -32,7 +32,8 @@ pub(super) fn says(text: &str, parts: &[&str]) {
     }
 }
 
-/// A camera's axes (right, down, forward) in a body's (forward, left, up), as an axis-angle vector: 120° about (-1, 1, -1)/√3.
+/// The rotation from a camera's axes (right, down, forward) to a body's (forward, left, up), as an axis-angle vector: 120° about (-1, 1,
+/// -1)/√3.
 pub(super) const OPTICAL: [f64; 3] = [
     -1.209_199_576_156_145,
     1.209_199_576_156_145,
@@ -40,14 +41,14 @@ pub(super) const OPTICAL: [f64; 3] = [
 ];
 pub(super) const STILL: [f64; 3] = [0.0; 3];
 
-/// A bag `drive.bag` in a folder of its own, with a file beside it unless that would be empty.
+/// A bag `drive.bag` in a folder of its own, with a file beside it unless its text is empty.
 pub(super) struct Drive {
     _folder: TempDir,
     pub(super) bag: PathBuf,
 }
 
 impl Drive {
-    /// Pictures of the frame `camera`, and a speed.
+    /// A bag with images of the frame `camera`, and a speed.
     pub(super) fn new(sidecar: &str, fill: impl FnOnce(&mut TinyBag)) -> Self {
         Self::bare(sidecar, |bag| {
             bag.within("camera").images("/camera/image");
@@ -86,7 +87,7 @@ pub(super) fn refusal(opened: Result<Dataset, Error>) -> String {
     format!("{error}\nhint: {}", error.hint().unwrap_or_default())
 }
 
-/// Where the camera is in the vehicle's axes, and where it looks.
+/// The camera's position and viewing direction in the vehicle's axes.
 pub(super) fn camera(dataset: &Dataset) -> (Vector3<f64>, Vector3<f64>) {
     let vehicle_from_cam = dataset.cam_from_vehicle().unwrap().inverse();
     (

@@ -1,5 +1,5 @@
-//! Bags as ROS vehicles record them: the sensors' places by `/tf_static` and `/tf`, speeds by satellite positions, several cameras,
-//! and no file beside them.
+//! Bags as recorded by ROS vehicles: mounts from `/tf_static` and `/tf`, speeds from GPS positions, several cameras,
+//! and no file beside the bag.
 
 mod common;
 mod mounts;

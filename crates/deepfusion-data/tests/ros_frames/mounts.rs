@@ -1,4 +1,4 @@
-//! Where the sensors are, by the frames of `/tf_static` and `/tf`, beside what a file or a profile says.
+//! Mounts from the frames of `/tf_static` and `/tf`, in combination with a file or a profile.
 
 use super::common::{Drive, OPTICAL, STILL, camera, is_near, open, says};
 use crate::common::bag::TinyBag;
@@ -38,7 +38,7 @@ fn the_file_goes_before_the_frames_and_a_disagreement_is_reported() {
         &[
             "cam_from_vehicle",
             "drive.toml and frames base_link → camera are 0.400 m and 0.00° apart",
-            "the former is taken",
+            "the former is used",
         ],
     );
 }
@@ -73,7 +73,7 @@ fn the_frames_go_before_a_profile() {
     assert!(both.has_ground_truth(3, GtKind::Z));
 }
 
-/// A camera that hangs from two parents is in two places, unless both say the same.
+/// A camera with two parents is ambiguous, unless both give the same mount.
 #[test]
 fn two_parents_are_refused_with_both_chains() {
     let frames = |y: f64| {
@@ -100,7 +100,7 @@ fn two_parents_are_refused_with_both_chains() {
             "base_link → roof → camera",
             "base_link → bumper → camera",
             "0.250 m",
-            "hint: say it: [cam_from_vehicle]",
+            "hint: set [cam_from_vehicle]",
             "drive.toml",
         ],
     );
@@ -117,7 +117,7 @@ fn two_parents_are_refused_with_both_chains() {
 
 #[test]
 fn the_vehicles_frame_is_the_likeliest_and_of_two_the_file_says_which() {
-    // A rear axle goes before base_link, wherever that lies.
+    // A rear axle takes precedence over base_link, wherever that is.
     let axle = Drive::new("", |bag| {
         bag.transforms("/tf_static", |_| {
             vec![
@@ -178,13 +178,13 @@ fn a_camera_that_pans_has_no_mount() {
         &[
             "cam_from_vehicle: the frames base_link and camera are not fixed to each other",
             "27.50°",
-            "nothing says where the camera is on the vehicle",
+            "the camera's mount is not given",
         ],
     );
     is_near(&camera(&dataset).0, [0.0; 3]);
     assert!(dataset.mounts().is_empty());
 
-    // On /tf, but where it was all the time, it is as good as static.
+    // On /tf but constant, it counts as static.
     let still = Drive::new("", |bag| {
         bag.transforms("/tf", |i| {
             vec![
@@ -196,7 +196,8 @@ fn a_camera_that_pans_has_no_mount() {
     is_near(&camera(&still.opened()).0, [1.0, 0.0, 1.0]);
 }
 
-/// A scan whose point is measured 40 ms after the time in its header, at 10 m/s; its driver left the motion in it, as the file says.
+/// A scan whose point is measured 40 ms after the time in its header, at 10 m/s; according to the file, its driver does not compensate for
+/// motion.
 #[test]
 fn a_point_with_a_time_of_its_own_is_brought_to_the_frame_from_there() {
     let depth = |sidecar: &str, after_s: f32| {
@@ -220,7 +221,7 @@ fn a_point_with_a_time_of_its_own_is_brought_to_the_frame_from_there() {
         "{at_once} {by_point}"
     );
     let text = depth(named, 5.0).unwrap_err().to_string();
-    says(&text, &["/points", "time", "more than a second"]);
+    says(&text, &["/points", "time", "more than 1 s"]);
 }
 
 #[test]
@@ -244,7 +245,7 @@ fn a_frame_that_is_not_optical_is_reported_and_turned() {
     );
     let warnings = text_of(dataset.warnings());
     says(&warnings, &["the images' frame camera has its z axis up"]);
-    // The scan's point is 10 m ahead of the LiDAR, 0.4 m higher than the camera: in the picture, or it were not seen.
+    // The scan's point is 10 m ahead of the LiDAR, 0.4 m higher than the camera, so it is in the image.
     let lidar = dataset.mounts().iter().find(|m| m.name == "cam_from_lidar");
     let cam_from_lidar = Se3::from_axis_angle(
         Vector3::from(lidar.unwrap().rotation),
@@ -278,7 +279,7 @@ fn frames_that_lead_nowhere_are_errors() {
     .unwrap();
     is_near(&camera(&missing.opened()).0, [1.0, 0.0, 1.0]);
 
-    // Nothing is known as the vehicle; the frame whose speed it is would be.
+    // No frame has a known name for the vehicle; naming that of the speed solves it.
     let nameless = Drive::bare("", |bag| {
         bag.within("camera").images("/camera/image");
         bag.camera_info("/camera/camera_info", 60.0);
@@ -308,7 +309,7 @@ fn frames_that_lead_nowhere_are_errors() {
 
 #[test]
 fn a_turned_inertial_unit_turns_the_vehicle_as_its_frame_says() {
-    // Upside down: its z looks down, so it measures the opposite rate, and what holds it up against gravity along -z.
+    // Upside down: its z points down, so it measures the opposite rate, and gravity's reaction along -z.
     let upside_down = [std::f64::consts::PI, 0.0, 0.0];
     let drive = |frames: bool| {
         Drive::new("", |bag| {
@@ -326,7 +327,7 @@ fn a_turned_inertial_unit_turns_the_vehicle_as_its_frame_says() {
     let turned = drive(true).opened();
     let turn = turned.track().unwrap().motion(0.2, 0.7).unwrap().yaw_rad;
     assert!((turn + 0.1).abs() < 5e-3, "{turn}");
-    // Without frames it would be taken as lying flat, which gravity contradicts.
+    // Without frames it is assumed to lie flat, which gravity contradicts.
     let text = drive(false).refusal();
     says(&text, &["180", "vehicle_from_imu"]);
 }

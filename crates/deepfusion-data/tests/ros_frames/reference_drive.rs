@@ -1,4 +1,4 @@
-//! A whole drive, which another program wrote and knows the truth of.
+//! A complete drive written by another program, with known ground truth.
 
 use super::common::{open, reference, says};
 use crate::common::text_of;
@@ -8,13 +8,13 @@ use nalgebra::{Matrix4, Vector3};
 use serde::Deserialize;
 use std::fs;
 
-/// What `reference/ros_drive.py` says of its drive.
+/// Ground truth of the drive, from `reference/ros_drive.py`.
 #[derive(Deserialize)]
 struct DriveFacts {
     cam_from_vehicle: [[f64; 4]; 4],
     cam_from_lidar: [[f64; 4]; 4],
     vehicle_from_imu: [[f64; 4]; 4],
-    /// Nanoseconds and m/s, along the exact path.
+    /// Times in nanoseconds and speeds in m/s, along the exact path.
     speeds: Vec<(i64, f64)>,
     images: usize,
 }
@@ -23,14 +23,14 @@ fn facts() -> DriveFacts {
     serde_json::from_str(&fs::read_to_string(reference("drive.json")).unwrap()).unwrap()
 }
 
-/// The chain of quaternions is exact to rounding; the file's own transforms are given to 16 digits.
+/// The chain of quaternions is exact up to rounding; the file's own transforms have 16 digits.
 fn is_transform(found: &Se3, expected: &[[f64; 4]; 4], what: &str) {
     let expected = Matrix4::from_fn(|r, c| expected[r][c]);
     let apart = (found.matrix() - expected).abs().max();
     assert!(apart < 1e-9, "{what}: {apart}");
 }
 
-/// Mounts are where scipy puts them, and speeds those of the path that the positions are of.
+/// Mounts agree with SciPy's, and speeds with those of the path from which the positions were computed.
 fn is_the_drive(dataset: &Dataset, known: &DriveFacts) {
     let mount = |name: &str| {
         let mount = dataset.mounts().iter().find(|m| m.name == name).unwrap();
@@ -47,7 +47,7 @@ fn is_the_drive(dataset: &Dataset, known: &DriveFacts) {
     let name = "vehicle_from_imu";
     is_transform(&mount(name), &known.vehicle_from_imu, name);
 
-    // 1 Hz, straight lines between: over the whole drive and at each frame.
+    // 1 Hz with linear interpolation: over the whole drive and at each frame.
     let origin_ns = dataset.origin_ns().unwrap();
     let speed_at = |time_s: f64| {
         let ns = origin_ns + (time_s * 1e9).round() as i64;
@@ -58,23 +58,23 @@ fn is_the_drive(dataset: &Dataset, known: &DriveFacts) {
     let pairs: Vec<(f64, f64)> = frames
         .filter_map(|f| Some((f.speed_mps?, speed_at(f.time_s?))))
         .collect();
-    // The last position is of the drive's ninth second, its end of the tenth.
+    // The last position is at 9 s, but the drive ends at 10 s.
     let after = dataset.frames().iter().filter(|f| f.time_s > Some(9.1));
     assert_eq!(pairs.len() + after.count(), dataset.frames().len());
     let of = |part: fn(&(f64, f64)) -> f64| pairs.iter().map(part).sum::<f64>();
     let ratio = of(|p| p.0) / of(|p| p.1);
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
-    // It brakes at 1.7 m/s² where the positions end, which they cannot show.
+    // The vehicle brakes at 1.7 m/s² where the positions end, which they cannot show.
     let rms = (of(|p| (p.0 - p.1).powi(2)) / pairs.len() as f64).sqrt();
     assert!(rms < 0.5, "{rms} m/s");
 
     let warnings = text_of(dataset.warnings());
-    assert!(!warnings.contains("nothing says"), "{warnings}");
+    assert!(!warnings.contains("not given"), "{warnings}");
     says(
         &warnings,
         &[
-            "/gnss/fix: left out, as they have no position: 1 of 10 messages",
-            "smoothed, sure to 0.",
+            "/gnss/fix: 1 of 10 messages left out for lack of a position",
+            "median standard deviation 0.",
             "bridged",
         ],
     );

@@ -1,4 +1,4 @@
-//! Which topics are taken, and what they say of speed.
+//! Which topics are read, and the speeds from them.
 
 use super::common::{Drive, open, open_with, refusal, says};
 use crate::common::bag::{CAMERA, TinyBag};
@@ -82,7 +82,7 @@ fn a_topic_is_named_by_a_caller() {
         panic!("two cameras");
     };
     assert_eq!(choice.to_string(), "image=/front/image_raw");
-    // Each camera with the calibration beside it; what is named goes before the file.
+    // Each camera has the calibration in its namespace; the caller's topics take precedence over the file's.
     let opened = |topics: &[&str]| open_with(&drive.bag, topics).unwrap();
     assert_eq!(opened(&["image=/front/image_raw"]).intrinsics(0).fx, 60.0);
     let left = opened(&["image=/left/image_raw"]);
@@ -96,19 +96,16 @@ fn a_topic_is_named_by_a_caller() {
     assert_eq!(other.intrinsics(0).fx, 60.0);
     assert!((other.frames()[12].speed_mps.unwrap() - 12.0).abs() < 0.05);
     let text = refusal(open_with(&drive.bag, &["image=/rear/image_raw"]));
-    says(
-        &text,
-        &["has no topic /rear/image_raw", "/front/image_raw, "],
-    );
+    says(&text, &["no topic /rear/image_raw", "/front/image_raw, "]);
     let text = refusal(open_with(&drive.bag, &["image=/twist"]));
     says(
         &text,
         &[
-            "/twist holds geometry_msgs/TwistStamped",
+            "/twist has messages of the wrong type geometry_msgs/TwistStamped",
             "sensor_msgs/Image",
         ],
     );
-    // A video, a folder of images: neither has topics.
+    // A folder of images has no topics.
     let folder = tempfile::tempdir().unwrap();
     let picture = deepfusion_data::RgbImage::new(8, 8);
     deepfusion_data::save_png(&picture, &folder.path().join("0.png")).unwrap();
@@ -116,7 +113,7 @@ fn a_topic_is_named_by_a_caller() {
     says(&text, &["image=/twist", "has no topics"]);
 }
 
-/// `nmea_navsat_driver` and ublox write east and north where a vehicle writes ahead and to the left.
+/// `nmea_navsat_driver` and ublox write east and north instead of forward and left.
 #[test]
 fn a_receiver_s_velocity_to_east_and_north_is_no_speed_ahead() {
     let opened = |course: fn(u32) -> f64| {
@@ -125,21 +122,21 @@ fn a_receiver_s_velocity_to_east_and_north_is_no_speed_ahead() {
         })
         .opened()
     };
-    // To the north-west: as a speed ahead it would be negative.
+    // To the north-west: used as forward speed, x would be negative.
     let receiver = opened(|_| 2.4);
     let speed = receiver.frames()[12].speed_mps.unwrap();
     assert!((speed - 8.0).abs() < 1e-6, "{speed}");
     assert!(!receiver.yaw_known());
-    says(&text_of(receiver.warnings()), &["/vel", "world's axes"]);
-    // A vehicle that slips in bends.
+    says(&text_of(receiver.warnings()), &["/vel", "world axes"]);
+    // A vehicle that slips in bends is not mistaken for it.
     let vehicle = opened(|i| if i % 5 == 0 { 0.35 } else { 0.05 });
     let speed = vehicle.frames()[12].speed_mps.unwrap();
     assert!(speed < 7.995, "{speed}");
     let said = text_of(vehicle.warnings());
-    assert!(!said.contains("world's axes"), "{said}");
+    assert!(!said.contains("world axes"), "{said}");
 }
 
-/// ROS 2's controllers publish what they are asked for with a stamp, too.
+/// ROS 2's controllers publish commands with stamps too.
 #[test]
 fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
     let sidecar = format!("{CAMERA}[vehicle]\nwheelbase_m = 2.5\n");
@@ -161,7 +158,7 @@ fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
     assert!(!said.contains("command"), "{said}");
     let turn = opened.track().unwrap().motion(0.2, 0.7).unwrap().yaw_rad;
     assert!(turn.abs() < 1e-6, "{turn}");
-    // Positions are weak, and measured.
+    // GPS positions are less accurate, but measured.
     near(
         speed(&drive(|bag| {
             bag.fixes("/fix", 12.0);
@@ -174,11 +171,11 @@ fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
     says(
         &text_of(opened.warnings()),
         &[
-            "/controller/cmd_vel: by its name a command, taken for the measured speed",
-            "/ackermann_cmd: by its name a command, taken for the measured steering",
+            "/controller/cmd_vel: a command by its name, used as measured speed",
+            "/ackermann_cmd: a command by its name, used as measured steering",
         ],
     );
-    // Whoever names it knows.
+    // There is no warning if the user named the topic.
     let named = ["speed=/controller/cmd_vel", "steering=/ackermann_cmd"];
     let named = open_with(&alone.bag, &named).unwrap();
     assert!(!text_of(named.warnings()).contains("command"));
@@ -193,14 +190,18 @@ fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
             fill(bag);
         })
     };
-    // What a filter leaves of the accelerations once gravity is out.
+    // Accelerations from which a filter has removed gravity.
     let filtered = level(|bag| {
         bag.imu_along_z("/imu/data", 0.2, 0.02);
     });
     let text = filtered.refusal();
     says(
         &text,
-        &["removed already", "[topics] imu = \"none\"", "drive.toml"],
+        &[
+            "removed already",
+            "imu = \"none\" under [topics]",
+            "drive.toml",
+        ],
     );
     assert!(matches!(
         open(&filtered.bag),
@@ -210,14 +211,14 @@ fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
         let motion = dataset.track().unwrap().motion(0.2, 0.7);
         motion.unwrap().yaw_rad
     };
-    // By its own yaw rate then, which the caller's word or the file's brings back.
+    // Without the unit, named as none by the caller or the file, the twist's own yaw rate is used.
     let left_out = open_with(&filtered.bag, &["imu=none"]).unwrap();
     assert!(left_out.yaw_known() && (turn(&left_out) - 0.1).abs() < 1e-6);
     let sidecar = format!("{CAMERA}[topics]\nimu = \"none\"\n");
     std::fs::write(filtered.bag.with_extension("toml"), sidecar).unwrap();
     assert!((turn(&filtered.opened()) - 0.1).abs() < 1e-6);
 
-    // RealSense's two: neither is a unit by itself.
+    // RealSense's two topics, neither of which is a complete unit.
     let apart = level(|bag| {
         bag.imu_along_z("/camera/gyro/sample", 0.2, 0.0)
             .accelerometer("/camera/accel/sample");
@@ -233,9 +234,9 @@ fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
     assert!((turn(&named) - 0.1).abs() < 1e-6);
     says(
         &text_of(named.warnings()),
-        &["/camera/accel/sample: not read, as it has no angular rates"],
+        &["/camera/accel/sample: not read, since it has no angular rates"],
     );
-    // What stands for no rate may be zeros, too.
+    // Missing rates may also be zeros.
     let still = Drive::bare(CAMERA, |bag| {
         bag.images("/image").twist("/twist", 10.0);
         bag.imu_along_z("/imu", 0.0, 9.81);
@@ -243,9 +244,9 @@ fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
     .opened();
     assert!(!still.yaw_known());
     says(&text_of(still.warnings()), &["/imu: not read"]);
-    // There is nothing without images.
+    // Images are required.
     let text = refusal(open_with(&apart.bag, &["imu=none", "image=none"]));
-    says(&text, &["has no topic none", "hint: image must be one of"]);
+    says(&text, &["no topic none", "hint: image must be one of"]);
 }
 
 #[test]
@@ -293,11 +294,11 @@ fn an_odometry_without_a_twist_moves_as_its_poses_do() {
     let scaled = drive(0.0, "vehicle = { speed_scale = 0.5 }\n");
     let speed = scaled.frames()[12].speed_mps.unwrap();
     assert!((speed - 5.0).abs() < 0.01, "{speed}");
-    // A body whose x looks to the side.
+    // A body whose x axis points to the side.
     let sideways = drive(1.5, "");
     assert_eq!(sideways.frames()[12].speed_mps, None);
     says(&text_of(sideways.warnings()), &["/Odometry: no speed"]);
-    // One that stands is believed.
+    // A vehicle at standstill is accepted.
     let standing = Drive::bare(CAMERA, |bag| {
         bag.images("/image").odometry("/odom", 0.0);
     })
@@ -305,7 +306,7 @@ fn an_odometry_without_a_twist_moves_as_its_poses_do() {
     assert_eq!(standing.frames()[12].speed_mps, Some(0.0));
 }
 
-/// As a GPX file's beside a video: what is unsure counts less in training.
+/// As with a GPX file beside a video, uncertain speeds have less weight in training.
 #[test]
 fn speeds_of_positions_say_how_sure_they_are() {
     let opened = |scale: &str, positions: bool| {

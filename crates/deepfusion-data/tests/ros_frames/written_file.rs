@@ -21,7 +21,7 @@ fn the_file_that_is_written_says_what_was_found() {
             "image = \"/camera/front/image_raw/compressed\"   # sensor_msgs/CompressedImage, 51 messages",
             "speed = \"/gnss/fix\"",
             "[cam_from_vehicle]   # frames base_link → roof_rack",
-            "# The camera is as CameraInfo has it.",
+            "# The camera is taken from CameraInfo.",
             "# wheelbase_m = 2.7",
         ],
     );
@@ -40,14 +40,14 @@ fn the_file_that_is_written_says_what_was_found() {
     assert_eq!(
         before.warnings(),
         after.warnings(),
-        "nothing contradicts anything"
+        "there are no contradictions"
     );
     let speeds = |dataset: &Dataset| -> Vec<Option<f64>> {
         dataset.frames().iter().map(|f| f.speed_mps).collect()
     };
     assert_eq!(speeds(&before), speeds(&after));
 
-    // Not over a file that is there, unless that is asked for; what it had to say stays.
+    // An existing file is only overwritten on request, and its settings are kept.
     let error = write_bag_config(&bag, &OpenOptions::default(), false).unwrap_err();
     assert!(matches!(error, Error::Exists { .. }), "{error}");
     let edited = format!("scenario = \"urban\"\n{text}\n[vehicle]\nwheelbase_m = 2.9\n");
@@ -67,7 +67,7 @@ fn the_file_that_is_written_says_what_was_found() {
             "wheelbase_m = 2.9",
             "fx = 70.0",
             "camera_ahead_s = 0.02",
-            "# as it was here before",
+            "# as before in this file",
         ],
     );
     let again = open(&bag).unwrap();
@@ -104,7 +104,7 @@ fn a_signal_makes_room_for_a_named_topic() {
     };
     write_bag_config(&drive.bag, &options, true).unwrap();
     assert!((speed(drive.opened()) - 5.0).abs() < 1e-3);
-    // What is written without a topic keeps the signal.
+    // If no topic is named, the signal is kept.
     let sidecar = drive.bag.with_extension("toml");
     fs::write(&sidecar, format!("{CAMERA}{can}")).unwrap();
     write_bag_config(&drive.bag, &OpenOptions::default(), true).unwrap();
@@ -123,7 +123,7 @@ fn what_nobody_says_is_left_to_be_filled_in() {
     let written = write_bag_config(&drive.bag, &options, false).unwrap();
     let text = fs::read_to_string(&written[0]).unwrap();
     says(&text, &["# [cam_from_vehicle]", "[camera]"]);
-    // The camera that was given is kept, and the commented lines are a transform once they are none.
+    // The given camera is kept, and the commented lines are a valid transform once uncommented.
     assert_eq!(drive.opened().intrinsics(0).fx, 60.0);
     let (head, place) = text.split_once("# [cam_from_vehicle]").unwrap();
     let (place, rest) = place.split_once("\n\n").unwrap();

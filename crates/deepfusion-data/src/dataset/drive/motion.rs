@@ -1,4 +1,4 @@
-//! How a drive's vehicle and camera moved, and what images and a receiver add to that.
+//! Motion of a drive's vehicle and camera, with what images and a GPS receiver add to it.
 
 use super::Dataset;
 use crate::dataset::ego::{Ego, Receiver};
@@ -8,35 +8,35 @@ use crate::dataset::warning::{DataWarning, MotionWarning, MountWarning};
 use crate::{MotionModel, Result, VehicleTrack};
 use deepfusion_geometry::Se3;
 
-/// Between the samples of a track whose turns are those of a course, in seconds.
+/// Interval between the samples of a track whose yaw rate comes from the course over ground, in seconds.
 const COURSE_STEP_S: f64 = 0.1;
 
 impl Dataset {
-    /// With a mount that nothing says, so that the camera is taken to look straight ahead, or one that something does.
+    /// The same data set, with its mount marked as assumed (the camera then looks straight ahead) or not.
     #[must_use]
     pub fn with_mount_assumed(mut self, assumed: bool) -> Self {
         self.mount_assumed = assumed;
         self
     }
 
-    /// Whether nothing says where the camera looks from the vehicle, nor has it been [aimed](Self::aim).
+    /// Whether the camera's viewing direction is only assumed: neither given nor [estimated from the images](Self::aim).
     #[must_use]
     pub fn mount_assumed(&self) -> bool {
         self.mount_assumed
     }
 
-    /// Turns the camera on its vehicle to where its images show that it looks: motions between frames then have that direction.
-    /// Nothing happens where the mount is not [assumed](Self::mount_assumed). A bag's scans are still brought to the frames' times by the
-    /// motion of the mount that was assumed: over milliseconds these differ by millimetres, over the tenth of a second that a scan's points
-    /// with times of their own may be apart by centimetres.
+    /// Turns the camera on its vehicle to the viewing direction that its images show, also for motions between frames.
+    /// Does nothing unless the mount is [assumed](Self::mount_assumed). A bag's scans are still moved to the frames' times with the
+    /// assumed mount. The difference is millimetres for a few milliseconds, and centimetres for points with their own times, which may
+    /// be a tenth of a second apart.
     pub fn aim(&mut self, heading: &Heading) {
         if let Some(cam_from_vehicle) = self.parts.cam_from_vehicle {
             self.aim_beside(heading, &cam_from_vehicle);
         }
     }
 
-    /// As [`Self::aim`], by what the images of another camera on the vehicle show, whose mount was `cam_from_vehicle` before that one was aimed:
-    /// where the two cameras are to each other stays as it is.
+    /// Like [`Self::aim`], with the heading of another camera on the vehicle, whose mount was `cam_from_vehicle` before it was turned.
+    /// The transform between the two cameras does not change.
     pub fn aim_beside(&mut self, heading: &Heading, cam_from_vehicle: &Se3) {
         if !self.mount_assumed {
             return;
@@ -56,16 +56,16 @@ impl Dataset {
         }
     }
 
-    /// Whether nothing says how the vehicle rolls and pitches, though its speed is known.
+    /// Whether the vehicle's speed is known, but not its roll and pitch.
     #[must_use]
     pub fn tilt_unknown(&self) -> bool {
         let track = self.parts.track.as_ref();
         track.is_some_and(MotionModel::lacks_tilt)
     }
 
-    /// With the vehicle's turns as its images show them, in the order of time: roll and pitch, and where no yaw rate was recorded the turns
-    /// to the side as well. Nothing happens where [they are known](Self::tilt_unknown), where none are given, and without a yaw rate where
-    /// those of a tenth of the pairs that moved are missing: a drive with holes in it is no better known.
+    /// Adds the vehicle's turns estimated from its images, in the order of time: roll and pitch, and also yaw if no yaw rate was
+    /// recorded. Does nothing if roll and pitch [are known](Self::tilt_unknown), if no turns are given, or if there is no yaw rate and
+    /// turns are missing for a tenth of the pairs that moved, because a yaw with gaps is of no use.
     pub fn take_turns(&mut self, turns: &[SeenTurn]) {
         let yaw_known = self.parts.yaw_known;
         let enough = yaw_known || self.shows_enough(turns);
@@ -88,9 +88,9 @@ impl Dataset {
         self.warnings.push(taken.into());
     }
 
-    /// Whether these are the turns of nine tenths of the neighbours between which the vehicle moved.
+    /// Whether there are turns for at least nine tenths of the neighbouring pairs in which the vehicle moved.
     fn shows_enough(&self, turns: &[SeenTurn]) -> bool {
-        /// Slower than this it stands, m/s.
+        /// Below this speed the vehicle counts as standing still, m/s.
         const STANDING: f64 = 0.5;
         let Ok(ego) = self.ego() else { return false };
         let moves = |(from_s, to_s): (f64, f64)| {
@@ -104,15 +104,15 @@ impl Dataset {
         10 * seen.count() >= 9 * moving
     }
 
-    /// With what a satellite receiver says beside the speeds.
+    /// The same data set with a GPS receiver's measurements other than speed.
     #[must_use]
     pub fn with_receiver(mut self, receiver: Receiver) -> Self {
         self.receiver = receiver;
         self
     }
 
-    /// The same with the turns of its receiver's course for a yaw rate, where it has no other: to compare clocks by, not to train
-    /// on, since a course is spread over a second or so. `None` where it has a yaw rate, or no course.
+    /// The same data set with the yaw rate from its GPS receiver's course, if it has no other. Only for comparing clocks, not for
+    /// training, since a course is smoothed over about a second. `None` if it already has a yaw rate, or has no course.
     #[must_use]
     pub fn turning_as_its_course(&self) -> Option<Self> {
         let track = self.parts.track.as_ref().filter(|_| !self.yaw_known())?;
@@ -131,27 +131,27 @@ impl Dataset {
         Some(turning)
     }
 
-    /// What a satellite receiver says beside the speeds; nothing where there is none.
+    /// A GPS receiver's measurements other than speed; all absent without a receiver.
     #[must_use]
     pub fn receiver(&self) -> &Receiver {
         &self.receiver
     }
 
-    /// The camera of frame `to` in the camera of frame `from` (`from_from_to`, metres), from the vehicle's speed and yaw
-    /// rate; `None` where either was not recorded, or the frames have no times.
+    /// The transform from the camera of frame `to` to the camera of frame `from` (`from_from_to`, metres), from the vehicle's speed and
+    /// yaw rate; `None` if either was not recorded, or the frames have no times.
     ///
     /// # Panics
-    /// If there is no frame of such an index.
+    /// If there is no frame with one of the indices.
     #[must_use]
     pub fn camera_motion(&self, from: usize, to: usize) -> Option<Se3> {
         let motion = self.ego().ok()?.between(self.frames(), to, from).ok()?;
         motion.source_from_target
     }
 
-    /// What the camera's motion is made from.
+    /// The vehicle's track and the camera's mount, from which the camera's motion is computed.
     ///
     /// # Errors
-    /// What is missing for it: [`crate::Error::Missing`] or [`crate::Error::NoTrack`].
+    /// [`crate::Error::Missing`] or [`crate::Error::NoTrack`] if one of them is missing.
     pub fn ego(&self) -> Result<Ego<'_>> {
         let timed = self.frames().iter().any(|f| f.time_s.is_some());
         match (&self.parts.track, self.parts.cam_from_vehicle) {

@@ -1,23 +1,22 @@
-//! What is unsure about a recording's camera.
+//! Warnings about a recording's camera.
 
 use crate::{CalibrationSource, CameraProblem};
 use deepfusion_geometry::ImplausibleCamera;
 use std::path::{Path, PathBuf};
 
-/// What is said of an action camera's picture whose EXIF block has a focal length.
-const ACTION_CAMERA: &str = "; an action camera's wide lens bends lines, which no pinhole does: take pictures through its linear lens, or \
+/// Added for an action camera's image whose EXIF block has a focal length.
+const ACTION_CAMERA: &str = "; an action camera's wide lens bends lines, unlike a pinhole camera: use its linear lens, or \
                              calibrate it as a fisheye lens";
-/// What is said of pictures that EXIF says to turn.
-const NOT_TURNED: &str =
-    "; the images are used as they are stored, not turned as EXIF's orientation says";
+/// Added for images with an EXIF orientation other than upright.
+const NOT_TURNED: &str = "; the images are used as stored, without the rotation in EXIF";
 
-/// What is unsure about a recording's camera.
+/// A warning about a recording's camera.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraWarning {
-    /// Nothing says it, and one stands in ([`crate::OpenOptions::assumed_camera`]).
+    /// There is no calibration, so a camera is assumed ([`crate::OpenOptions::assumed_camera`]).
     #[error(
-        "nothing says what the camera is: fx = {fx:.1}, fy = {fy:.1} are assumed, the principal point in the middle"
+        "no calibration of the camera: assuming fx = {fx:.1}, fy = {fy:.1} and a centred principal point"
     )]
     Assumed {
         /// Focal length along x, pixels.
@@ -25,41 +24,41 @@ pub enum CameraWarning {
         /// Focal length along y, pixels.
         fy: f64,
     },
-    /// Only the EXIF block of an image says it.
+    /// The camera is only known from an image's EXIF block.
     #[error(
-        "the camera is taken from EXIF in {}: {by}, so fx = fy = {focal_px:.1}, the principal point in the middle; a calibration is better{}{}",
+        "the camera is taken from EXIF in {}: {by}, so fx = fy = {focal_px:.1}, with a centred principal point; a calibration is better{}{}",
         name(image),
         if *action_camera { ACTION_CAMERA } else { "" },
         if *turned { NOT_TURNED } else { "" }
     )]
     ByExif {
-        /// The image.
+        /// Path of the image.
         image: PathBuf,
-        /// What the block says, for people.
+        /// The entry in the block, as printed.
         by: String,
-        /// The focal length that follows, pixels.
+        /// The resulting focal length, pixels.
         focal_px: f64,
-        /// Whether an action camera took it, whose wide lenses are no pinhole.
+        /// Whether it was taken by an action camera, whose wide lenses are not pinhole cameras.
         action_camera: bool,
-        /// Whether the images are to be turned to be upright, which is not done.
+        /// Whether EXIF has a rotation to make the images upright, which is not applied.
         turned: bool,
     },
-    /// Only a GoPro's video says it, by its linear lens.
+    /// The camera is only known from a GoPro's video, filmed through the linear lens.
     #[error(
-        "the camera is taken from {}: the linear lens of a {model}, {diagonal_deg:.1}° from corner to corner, so fx = fy = {focal_px:.1}, the principal point in the middle; a calibration is better",
+        "the camera is taken from {}: the linear lens of a {model}, {diagonal_deg:.1}° from corner to corner, so fx = fy = {focal_px:.1}, with a centred principal point; a calibration is better",
         name(video)
     )]
     ByGopro {
-        /// The video.
+        /// Path of the video.
         video: PathBuf,
         /// The GoPro's model.
         model: String,
         /// The lens' field of view along the diagonal, degrees.
         diagonal_deg: f64,
-        /// The focal length that follows, pixels.
+        /// The resulting focal length, pixels.
         focal_px: f64,
     },
-    /// A GoPro's video was filmed through a lens that is no pinhole's, and its calibration has none of the lens.
+    /// A GoPro's video was filmed through a lens that is not a pinhole camera's, and the calibration has no distortion.
     #[error("{}: {}", bends_lines(lens, model), CameraProblem::OTHER_LENS)]
     BendsLines {
         /// The lens, as the GoPro's menu calls it.
@@ -67,25 +66,25 @@ pub enum CameraWarning {
         /// The GoPro's model.
         model: String,
     },
-    /// The calibration does not say of which size its images are.
+    /// The calibration does not state its image size.
     #[error(
-        "{} does not say for which size its camera is: taken for the images' {width}x{height}",
+        "{}: no image size is given, assuming the images' {width}x{height}",
         file_name(by)
     )]
     SizeUnknown {
-        /// Who says the camera.
+        /// Where the calibration comes from.
         by: CalibrationSource,
         /// Width of the first image, pixels.
         width: u32,
-        /// Its height, pixels.
+        /// Height of the first image, pixels.
         height: u32,
     },
-    /// The images are freed of their lens' distortion, so that their camera is not quite the calibration's.
+    /// The images are corrected for lens distortion, so their intrinsics differ from the calibration's.
     #[error(
-        "the lens' distortion is taken out of the images; fx, fy, cx, cy are those of the result"
+        "the images are corrected for lens distortion; fx, fy, cx, cy are those of the corrected images"
     )]
     LensCorrected,
-    /// The numbers are no usual camera's.
+    /// The intrinsics are implausible.
     #[error(transparent)]
     Implausible(#[from] ImplausibleCamera),
 }
@@ -95,7 +94,7 @@ fn name(file: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// The name of the file that says a camera, else who does.
+/// The name of the calibration file, or a description of another source.
 fn file_name(by: &CalibrationSource) -> String {
     let file = match by {
         CalibrationSource::File(path) => path.file_name(),
@@ -127,15 +126,15 @@ mod tests {
             action_camera,
             turned,
         };
-        let taken = "the camera is taken from EXIF in 000.jpg: 26 mm in 35 mm film, so fx = fy = 3004.6, the principal point in the middle; a \
+        let taken = "the camera is taken from EXIF in 000.jpg: 26 mm in 35 mm film, so fx = fy = 3004.6, with a centred principal point; a \
                      calibration is better";
         assert_eq!(by_exif(false, false).to_string(), taken);
         let said = by_exif(true, true).to_string();
         let more = said.strip_prefix(taken).unwrap();
         assert_eq!(
             more,
-            "; an action camera's wide lens bends lines, which no pinhole does: take pictures through its linear lens, or calibrate it as a \
-             fisheye lens; the images are used as they are stored, not turned as EXIF's orientation says"
+            "; an action camera's wide lens bends lines, unlike a pinhole camera: use its linear lens, or calibrate it as a \
+             fisheye lens; the images are used as stored, without the rotation in EXIF"
         );
         for (warning, said) in [
             (
@@ -143,7 +142,7 @@ mod tests {
                     fx: 920.04,
                     fy: 919.96,
                 },
-                "nothing says what the camera is: fx = 920.0, fy = 920.0 are assumed, the principal point in the middle",
+                "no calibration of the camera: assuming fx = 920.0, fy = 920.0 and a centred principal point",
             ),
             (
                 CameraWarning::ByGopro {
@@ -153,15 +152,15 @@ mod tests {
                     focal_px: 1101.46,
                 },
                 "the camera is taken from GX010001.MP4: the linear lens of a HERO11 Black, 90.0° from corner to corner, so fx = fy = 1101.5, \
-                 the principal point in the middle; a calibration is better",
+                 with a centred principal point; a calibration is better",
             ),
             (
                 CameraWarning::BendsLines {
                     lens: "wide".into(),
                     model: "HERO11 Black".into(),
                 },
-                "the video says that its lens was \"wide\" on a HERO11 Black, which bends lines as no pinhole does: film through the linear \
-                 lens, or calibrate this one as a fisheye lens",
+                "according to the video, it was filmed through the lens \"wide\" of a HERO11 Black, which bends lines, unlike a pinhole camera: \
+                 film through the linear lens, or calibrate this one as a fisheye lens",
             ),
             (
                 CameraWarning::Implausible(ImplausibleCamera::Focal {
@@ -183,11 +182,11 @@ mod tests {
         };
         assert_eq!(
             said(CalibrationSource::File("drive/intrinsics.txt".into())),
-            "intrinsics.txt does not say for which size its camera is: taken for the images' 1242x375"
+            "intrinsics.txt: no image size is given, assuming the images' 1242x375"
         );
         assert_eq!(
             said(CalibrationSource::Given),
-            "given intrinsics does not say for which size its camera is: taken for the images' 1242x375"
+            "given intrinsics: no image size is given, assuming the images' 1242x375"
         );
     }
 }

@@ -1,76 +1,76 @@
-//! What of a recording is left out, is not there or cannot be read.
+//! Warnings about what is left out, missing or unreadable.
 
 use crate::DatasetKind;
 use deepfusion_hint::count_of;
 use deepfusion_rosbag::SourceDamage;
 use std::path::{Path, PathBuf};
 
-/// What of a recording, or of the folder in which it lies, is left out, is not there or cannot be read.
+/// A warning about what is left out, missing or unreadable in a recording or its folder.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IncompleteWarning {
-    /// Of several recordings some give no images.
-    #[error("left out, as they give no images{}: {}", of_camera(*camera), recordings.join(", "))]
+    /// Some of several recordings have no images.
+    #[error("left out for lack of images{}: {}", of_camera(*camera), recordings.join(", "))]
     NoImages {
-        /// The camera whose images are missing, where the layout numbers them.
+        /// Number of the camera whose images are missing, if the layout has camera numbers.
         camera: Option<u8>,
         /// The recordings' names.
         recordings: Vec<String>,
     },
-    /// Something in the folder looks like a recording and is not read ([`crate::Dataset::passed_over`]).
+    /// Something in the folder looks like a recording but is not read ([`crate::Dataset::passed_over`]).
     #[error("{}", passed_over(folder, *layout, recordings))]
     PassedOver {
-        /// The folder.
+        /// Path of the folder.
         folder: PathBuf,
-        /// As what it is read.
+        /// The layout as which it is read.
         layout: DatasetKind,
-        /// The names of what is not read, in their order.
+        /// The names of what is not read, sorted.
         recordings: Vec<String>,
     },
-    /// Tables name images that are not there.
+    /// Image files listed in the tables are missing.
     #[error(
-        "{missing} of {} {} not there{} {such_as}",
+        "{missing} of {} {} missing{} {such_as}",
         count_of(*of, "image"),
         if *missing == 1 { "is" } else { "are" },
         if *missing == 1 { ":" } else { ", such as" }
     )]
     ImagesMissing {
-        /// How many are not.
+        /// Number of missing images.
         missing: usize,
-        /// How many are named.
+        /// Number of listed images.
         of: usize,
-        /// The first that is not.
+        /// Path of the first missing image.
         such_as: String,
     },
-    /// A table of the images leaves some out.
-    #[error("{table} leaves {images} of the images out")]
+    /// A table does not list all images.
+    #[error("{table}: {} not listed", count_of(*images, "image"))]
     ImagesUnlisted {
         /// The table's name.
         table: &'static str,
-        /// How many.
+        /// Number of images that are not listed.
         images: usize,
     },
-    /// A video stream was recorded from the middle on.
+    /// The recording of a video stream does not start with a key frame.
     #[error(
         "{topic}: the first {} before the first key frame and cannot be decoded: {} left out",
         messages_come(*messages),
         if *messages == 1 { "it is" } else { "they are" }
     )]
     BeforeKeyFrame {
-        /// The stream's topic.
+        /// Name of the stream's topic.
         topic: String,
-        /// How many messages came before its first key frame.
+        /// Number of messages before its first key frame.
         messages: u64,
     },
-    /// A bag is damaged: what its reader found ([`deepfusion_rosbag::MessageSource::damage`]).
+    /// A bag is damaged, according to its reader ([`deepfusion_rosbag::MessageSource::damage`]).
     #[error("the bag is damaged: {0}")]
     Damaged(SourceDamage),
     /// Messages or chunks of a bag cannot be read.
     #[error("{}", unreadable(*parts, first))]
     Unreadable {
-        /// How many.
+        /// Number of unreadable messages and chunks.
         parts: usize,
-        /// The first one's error, in words.
+        /// Message of the first error.
         first: String,
     },
 }
@@ -80,7 +80,7 @@ fn of_camera(camera: Option<u8>) -> String {
 }
 
 fn passed_over(folder: &Path, layout: DatasetKind, recordings: &[String]) -> String {
-    /// Names that are said.
+    /// How many names are listed.
     const MOST: usize = 6;
     let said = recordings.get(..MOST).unwrap_or(recordings).join(", ");
     let more = match recordings.len().checked_sub(MOST) {
@@ -93,7 +93,7 @@ fn passed_over(folder: &Path, layout: DatasetKind, recordings: &[String]) -> Str
         ("these", "look like recordings and are", "each")
     };
     format!(
-        "{} is read as {} alone; {these} in it {are} not read: {said}{more} (give {each} by its own path)",
+        "{} is read only as {}; {these} in it {are} not read: {said}{more} (give {each} by its own path)",
         folder.display(),
         layout.label()
     )
@@ -133,9 +133,9 @@ mod tests {
         };
         assert_eq!(
             said(1),
-            "drives is read as image folder alone; this in it looks like a recording and is not read: drive1.bag (give it by its own path)"
+            "drives is read only as image folder; this in it looks like a recording and is not read: drive1.bag (give it by its own path)"
         );
-        let these = "drives is read as image folder alone; these in it look like recordings and are not read: drive1.bag, drive2.bag";
+        let these = "drives is read only as image folder; these in it look like recordings and are not read: drive1.bag, drive2.bag";
         let each = "(give each by its own path)";
         assert_eq!(said(2), format!("{these} {each}"));
         let six = format!("{these}, drive3.bag, drive4.bag, drive5.bag, drive6.bag");
@@ -160,11 +160,11 @@ mod tests {
         for (warning, said) in [
             (
                 no_images(None),
-                "left out, as they give no images: drive1.bag, drive2.bag",
+                "left out for lack of images: drive1.bag, drive2.bag",
             ),
             (
                 no_images(Some(2)),
-                "left out, as they give no images of camera 2: drive1.bag, drive2.bag",
+                "left out for lack of images of camera 2: drive1.bag, drive2.bag",
             ),
             (
                 IncompleteWarning::ImagesMissing {
@@ -172,7 +172,7 @@ mod tests {
                     of: 8,
                     such_as: "sweeps/CAM_FRONT/1.jpg".into(),
                 },
-                "6 of 8 images are not there, such as sweeps/CAM_FRONT/1.jpg",
+                "6 of 8 images are missing, such as sweeps/CAM_FRONT/1.jpg",
             ),
             (
                 IncompleteWarning::ImagesMissing {
@@ -180,14 +180,14 @@ mod tests {
                     of: 8,
                     such_as: "sweeps/CAM_FRONT/1.jpg".into(),
                 },
-                "1 of 8 images is not there: sweeps/CAM_FRONT/1.jpg",
+                "1 of 8 images is missing: sweeps/CAM_FRONT/1.jpg",
             ),
             (
                 IncompleteWarning::ImagesUnlisted {
                     table: "frames.csv",
                     images: 2,
                 },
-                "frames.csv leaves 2 of the images out",
+                "frames.csv: 2 images not listed",
             ),
             (
                 before(1),

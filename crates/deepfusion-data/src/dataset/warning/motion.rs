@@ -1,195 +1,189 @@
-//! What is unsure about how the vehicle moved.
+//! Warnings about the vehicle's motion.
 
 use crate::TopicRole;
 use deepfusion_hint::count_of;
 use deepfusion_logs::LogNote;
 use deepfusion_motion::can::CanId;
 
-/// What is unsure about how the vehicle moved.
+/// A warning about the vehicle's motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MotionWarning {
-    /// No speed was measured about the time of some frames.
+    /// No speed was measured around the time of some frames.
     #[error(
-        "no speed is measured about the time of {frames} of {}",
+        "no speed was measured around the time of {frames} of {}",
         count_of(*of, "frame")
     )]
     FramesWithoutSpeed {
-        /// How many frames.
+        /// Number of frames without a speed.
         frames: usize,
-        /// Of so many that have a time.
+        /// Number of frames with a time.
         of: usize,
     },
-    /// Speeds are in a log, and turns nowhere.
-    #[error("{log}: no yaw rate, here or in imu.csv: how the car turned is not recorded")]
+    /// A log has speeds, but no yaw rate was recorded.
+    #[error("{log}: no yaw rate, here or in imu.csv: the vehicle's turns are unknown")]
     NoYawRate {
         /// The log's name.
         log: String,
     },
-    /// A recording in KITTI's layout whose `dataset.toml` says that its yaw rates are none.
-    #[error("oxts: yaw_known = false in dataset.toml: how the car turned is not recorded")]
+    /// In a recording in KITTI's layout, `dataset.toml` marks the yaw rates as unknown.
+    #[error("oxts: yaw_known = false in dataset.toml: the vehicle's turns are unknown")]
     YawNotMeasured,
-    /// How another program's log was understood ([`deepfusion_logs::DriveLog::notes`]).
+    /// A note on how another program's log was interpreted ([`deepfusion_logs::DriveLog::notes`]).
     #[error("{log}: {note}")]
     Understood {
         /// The log's name.
         log: String,
-        /// How.
+        /// The note.
         note: LogNote,
     },
-    /// `course.csv` is not what this program writes under that name.
-    #[error("course.csv: not read, as it has no column course_rate_radps")]
+    /// `course.csv` was not written by this program.
+    #[error("course.csv: not read, since it has no column course_rate_radps")]
     NoCourseRates,
-    /// `course.csv` is no table.
+    /// `course.csv` is not a readable table.
     #[error("not read: {why}")]
     CourseNotRead {
-        /// The error that reading it gave, with its path.
+        /// Message of the error on reading it, with its path.
         why: String,
     },
-    /// Speeds lie far apart, and those between were filled in.
+    /// Gaps between speeds were interpolated.
     #[error(
-        "{log}: {} of up to {longest_s:.1} s between speeds are bridged in a straight line ({setting})",
+        "{log}: speeds are interpolated linearly across {} of up to {longest_s:.1} s ({setting})",
         count_of(*gaps, "gap")
     )]
     Bridged {
         /// The name of the log or the topic.
         log: String,
-        /// How many gaps.
+        /// Number of gaps.
         gaps: usize,
         /// The longest of them, seconds.
         longest_s: f64,
-        /// The key that says which are bridged, and its file.
+        /// The key for the longest gap that is bridged, and its file.
         setting: &'static str,
     },
-    /// Speeds lie so far apart that nothing is known between them.
+    /// Gaps between speeds are too long to be bridged.
     #[error(
-        "{log}: {} of more than {most_s:.1} s, across which the speed counts as unknown ({setting})",
+        "{log}: {} of more than {most_s:.1} s, in which the speed counts as unknown ({setting})",
         count_of(*gaps, "gap")
     )]
     NotBridged {
         /// The name of the log or the topic.
         log: String,
-        /// How many gaps.
+        /// Number of gaps.
         gaps: usize,
-        /// The longest that would be bridged, seconds.
+        /// The longest gap that would be bridged, seconds.
         most_s: f64,
-        /// The key that says which are bridged, and its file.
+        /// The key for the longest gap that is bridged, and its file.
         setting: &'static str,
     },
-    /// Nothing in a comma2k19 segment says how the car turned.
+    /// A comma2k19 segment has no measurement of turns.
     #[error(
-        "the segment has neither gyroscope and accelerometer nor a steering angle of a known vehicle: how the car turned is unknown"
+        "the segment has neither gyroscope and accelerometer nor the steering angle of a known vehicle: the vehicle's turns are unknown"
     )]
     SegmentWithoutTurns,
-    /// Turns were not recorded, and are taken from the images ([`crate::Dataset::take_turns`]).
+    /// Turns were not recorded, and are estimated from the images ([`crate::Dataset::take_turns`]).
     #[error(
-        "{} are not recorded: they are taken from the images{}, {:.2} degrees of pitch from one to the next (median)",
+        "{} are not recorded: estimating them from the images{}; median pitch from one to the next {:.2} degrees",
         if *yaw_recorded { "roll and pitch" } else { "the vehicle's turns (yaw, roll and pitch)" },
         some_of(*seen, *pairs),
         pitch_rad.to_degrees()
     )]
     TurnsOfImages {
-        /// Whether a yaw rate was recorded, so that roll and pitch alone are taken.
+        /// Whether a yaw rate was recorded, so that only roll and pitch are estimated.
         yaw_recorded: bool,
-        /// Between how many neighbouring images the turn was seen.
+        /// Number of neighbouring pairs with an estimated turn.
         seen: usize,
-        /// How many neighbours there are.
+        /// Number of neighbouring pairs.
         pairs: usize,
         /// The median change of pitch from one image to the next, radians.
         pitch_rad: f64,
     },
-    /// A satellite receiver had no position for a while.
+    /// A GPS receiver had no position for a while.
     #[error(
-        "{topic}: left out, as they have no position: {messages} of {}",
+        "{topic}: {messages} of {} left out for lack of a position",
         count_of(*of, "message")
     )]
     NoPosition {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
-        /// How many of its messages have none.
+        /// Number of its messages without a position.
         messages: usize,
-        /// How many messages it has.
+        /// Number of its messages.
         of: usize,
     },
-    /// A satellite receiver's positions are too few to give a speed.
+    /// A GPS receiver has too few positions for a speed.
     #[error(
-        "{topic}: no speed from {}, at least two in ten seconds are needed",
+        "{topic}: no speed from {}, expected at least two within 10 s",
         count_of(*positions, "position")
     )]
     TooFewPositions {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
-        /// How many there are.
+        /// Number of positions.
         positions: usize,
     },
-    /// The speeds follow from a satellite receiver's positions.
+    /// The speeds are computed from a GPS receiver's positions.
     #[error(
-        "{topic}: speeds are those of its positions, smoothed, sure to {sigma_mps:.2} m/s in the middle"
+        "{topic}: speeds are computed from its positions and smoothed; median standard deviation {sigma_mps:.2} m/s"
     )]
     OfPositions {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
         /// The median of their standard deviations, m/s.
         sigma_mps: f64,
     },
-    /// A topic's velocities are along other axes than the vehicle's.
-    #[error(
-        "{topic}: its velocities are in the world's axes: their length is taken as the speed, and always as forward"
-    )]
+    /// A topic's velocities are in world axes instead of the vehicle's.
+    #[error("{topic}: its velocities are in world axes: using their length as forward speed")]
     WorldAxes {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
     },
-    /// What the vehicle was asked for stands for what it did.
-    #[error(
-        "{topic}: by its name a command, taken for the measured {role} as nothing else is there; another source is better"
-    )]
+    /// A command to the vehicle is used as a measurement.
+    #[error("{topic}: a command by its name, used as measured {role} for lack of another source")]
     Commanded {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
-        /// What it is taken for.
+        /// The role for which it is used.
         role: TopicRole,
     },
-    /// The messages of an odometry have no twist: its poses say how the vehicle moves.
-    #[error("{topic}: its messages have no twist: speed and turns are those of its poses")]
+    /// Odometry messages have no twist, so the vehicle's motion is computed from their poses.
+    #[error("{topic}: its messages have no twist: speed and turns are computed from its poses")]
     OfPoses {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
     },
-    /// The messages of an odometry have no twist, and its poses are of a body with other axes than the vehicle's.
+    /// Odometry messages have no twist, and their poses have axes other than the vehicle's.
     #[error(
-        "{topic}: no speed, as its messages have no twist, and its poses' x does not point along the way"
+        "{topic}: no speed, since its messages have no twist and the x axis of its poses does not point forward"
     )]
     PosesOfOtherAxes {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
     },
-    /// The messages of an odometry have no twist, and so much time is between its poses that nothing is known in between.
+    /// Odometry messages have no twist, and the time between their poses is too long.
     #[error(
-        "{topic}: no speed, as its messages have no twist, and its poses are too far apart in time"
+        "{topic}: no speed, since its messages have no twist and its poses are too far apart in time"
     )]
     PosesFarApart {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
     },
-    /// The messages of an inertial unit say no angular rates.
-    #[error(
-        "{topic}: not read, as it has no angular rates: they are 0 throughout, or said not to be there"
-    )]
+    /// The messages of an inertial unit have no angular rates.
+    #[error("{topic}: not read, since it has no angular rates (all are 0, or marked as missing)")]
     NoRates {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
     },
-    /// Values that a signal has by its description never: the bus's way to say that it has none.
-    #[error("{key}: {} beyond the signal's range left out", count_of(*frames, "value"))]
+    /// Values outside the signal's defined range, which mark missing values on the bus.
+    #[error("{key}: {} outside the signal's range left out", count_of(*frames, "value"))]
     BeyondRange {
         /// The signal's key in the file beside the bag.
         key: &'static str,
-        /// How many.
+        /// Number of values.
         frames: usize,
     },
-    /// No frame of the bus holds a signal that was named.
-    #[error("{key}: no CAN frame {} holds a value of it", number(*id))]
+    /// No CAN frame has a value of a named signal.
+    #[error("{key}: no CAN frame {} has a value of it", number(*id))]
     SilentSignal {
         /// The signal's key in the file beside the bag.
         key: &'static str,
@@ -225,7 +219,7 @@ mod tests {
         for (warning, said) in [
             (
                 MotionWarning::FramesWithoutSpeed { frames: 3, of: 12 },
-                "no speed is measured about the time of 3 of 12 frames",
+                "no speed was measured around the time of 3 of 12 frames",
             ),
             (
                 MotionWarning::Understood {
@@ -241,7 +235,7 @@ mod tests {
                     longest_s: 1.04,
                     setting: "max_gap_s in dataset.toml",
                 },
-                "speed.csv: 4 gaps of up to 1.0 s between speeds are bridged in a straight line (max_gap_s in dataset.toml)",
+                "speed.csv: speeds are interpolated linearly across 4 gaps of up to 1.0 s (max_gap_s in dataset.toml)",
             ),
             (
                 MotionWarning::NotBridged {
@@ -250,7 +244,7 @@ mod tests {
                     most_s: 3.0,
                     setting: "max_gap_s in dataset.toml",
                 },
-                "speed.csv: 1 gap of more than 3.0 s, across which the speed counts as unknown (max_gap_s in dataset.toml)",
+                "speed.csv: 1 gap of more than 3.0 s, in which the speed counts as unknown (max_gap_s in dataset.toml)",
             ),
             (
                 MotionWarning::NoPosition {
@@ -258,50 +252,50 @@ mod tests {
                     messages: 1,
                     of: 10,
                 },
-                "/gnss/fix: left out, as they have no position: 1 of 10 messages",
+                "/gnss/fix: 1 of 10 messages left out for lack of a position",
             ),
             (
                 MotionWarning::TooFewPositions {
                     topic: topic(),
                     positions: 1,
                 },
-                "/gnss/fix: no speed from 1 position, at least two in ten seconds are needed",
+                "/gnss/fix: no speed from 1 position, expected at least two within 10 s",
             ),
             (
                 MotionWarning::OfPositions {
                     topic: topic(),
                     sigma_mps: 0.123,
                 },
-                "/gnss/fix: speeds are those of its positions, smoothed, sure to 0.12 m/s in the middle",
+                "/gnss/fix: speeds are computed from its positions and smoothed; median standard deviation 0.12 m/s",
             ),
             (
                 MotionWarning::Commanded {
                     topic: "/cmd_vel".into(),
                     role: TopicRole::Speed,
                 },
-                "/cmd_vel: by its name a command, taken for the measured speed as nothing else is there; another source is better",
+                "/cmd_vel: a command by its name, used as measured speed for lack of another source",
             ),
             (
                 MotionWarning::OfPoses {
                     topic: "/Odometry".into(),
                 },
-                "/Odometry: its messages have no twist: speed and turns are those of its poses",
+                "/Odometry: its messages have no twist: speed and turns are computed from its poses",
             ),
             (
                 MotionWarning::PosesOfOtherAxes {
                     topic: "/vins".into(),
                 },
-                "/vins: no speed, as its messages have no twist, and its poses' x does not point along the way",
+                "/vins: no speed, since its messages have no twist and the x axis of its poses does not point forward",
             ),
             (
                 MotionWarning::NoRates {
                     topic: "/camera/accel/sample".into(),
                 },
-                "/camera/accel/sample: not read, as it has no angular rates: they are 0 throughout, or said not to be there",
+                "/camera/accel/sample: not read, since it has no angular rates (all are 0, or marked as missing)",
             ),
             (
                 MotionWarning::WorldAxes { topic: topic() },
-                "/gnss/fix: its velocities are in the world's axes: their length is taken as the speed, and always as forward",
+                "/gnss/fix: its velocities are in world axes: using their length as forward speed",
             ),
         ] {
             assert_eq!(warning.to_string(), said);
@@ -325,7 +319,7 @@ mod tests {
                 MotionWarning::NoYawRate {
                     log: "speed.csv".into(),
                 },
-                "speed.csv: no yaw rate, here or in imu.csv: how the car turned is not recorded",
+                "speed.csv: no yaw rate, here or in imu.csv: the vehicle's turns are unknown",
             ),
             (
                 MotionWarning::CourseNotRead {
@@ -335,33 +329,33 @@ mod tests {
             ),
             (
                 MotionWarning::SegmentWithoutTurns,
-                "the segment has neither gyroscope and accelerometer nor a steering angle of a known vehicle: how the car turned is unknown",
+                "the segment has neither gyroscope and accelerometer nor the steering angle of a known vehicle: the vehicle's turns are unknown",
             ),
             (
                 turns(true, 10),
-                "roll and pitch are not recorded: they are taken from the images, 0.25 degrees of pitch from one to the next (median)",
+                "roll and pitch are not recorded: estimating them from the images; median pitch from one to the next 0.25 degrees",
             ),
             (
                 turns(false, 6),
-                "the vehicle's turns (yaw, roll and pitch) are not recorded: they are taken from the images (6 of 10 pairs), 0.25 degrees of \
-                 pitch from one to the next (median)",
+                "the vehicle's turns (yaw, roll and pitch) are not recorded: estimating them from the images (6 of 10 pairs); median pitch \
+                 from one to the next 0.25 degrees",
             ),
             (
                 MotionWarning::BeyondRange {
                     key: "can.speed",
                     frames: 1,
                 },
-                "can.speed: 1 value beyond the signal's range left out",
+                "can.speed: 1 value outside the signal's range left out",
             ),
             (
                 silent(CanId::Standard(0x158)),
-                "can.speed: no CAN frame 0x158 holds a value of it",
+                "can.speed: no CAN frame 0x158 has a value of it",
             ),
             (
                 silent(CanId::Extended {
                     extended: 0x18f0_090b,
                 }),
-                "can.speed: no CAN frame 0x18f0090b (29 bits) holds a value of it",
+                "can.speed: no CAN frame 0x18f0090b (29 bits) has a value of it",
             ),
         ] {
             assert_eq!(warning.to_string(), said);

@@ -1,140 +1,140 @@
-//! What is unsure about where the sensors are on the vehicle.
+//! Warnings about the sensors' mounts on the vehicle.
 
 use crate::Heading;
 use crate::formats::Change;
 use deepfusion_hint::count_of;
 use std::path::PathBuf;
 
-/// What is said first where nothing tells where the camera is.
-const NOT_GIVEN: &str = "the camera's place on the vehicle is not given ([mount] in dataset.toml):";
+/// Beginning of the warnings about an unknown camera mount.
+const NOT_GIVEN: &str = "the camera's mount is not given ([mount] in dataset.toml):";
 
-/// What is unsure about where the sensors are on the vehicle.
+/// A warning about the sensors' mounts on the vehicle.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MountWarning {
-    /// Nothing, not even its images, tells where the camera is.
-    #[error("{NOT_GIVEN} it is taken to look straight ahead and to move as the vehicle does")]
+    /// The camera's mount is unknown, and was not estimated from its images.
+    #[error("{NOT_GIVEN} assuming that it looks straight ahead from the vehicle's origin")]
     NotGiven,
-    /// Nothing but its images tells where the camera looks ([`crate::Dataset::aim`]).
+    /// The camera's viewing direction is estimated from its images ([`crate::Dataset::aim`]).
     #[error("{NOT_GIVEN} {0}")]
     Aimed(Heading),
-    /// KITTI odometry leaves it out.
+    /// KITTI odometry does not include the cameras' mounts.
     #[error(
-        "KITTI odometry does not say where the cameras are on the car: their place is taken from KITTI raw's calibration, their direction from the way the car goes"
+        "KITTI odometry does not include the cameras' mounts: taking their positions from KITTI raw's calibration, their direction from the path"
     )]
     OfKittiRaw,
-    /// A bag does not say where its camera is.
+    /// A bag does not include the camera's mount.
     #[error(
-        "nothing says where the camera is on the vehicle: it is taken to look ahead and to move as the rear axle does"
+        "the camera's mount is not given: assuming that it looks straight ahead from the rear axle"
     )]
     CameraUnknown,
-    /// A bag does not say where its LiDAR is.
-    #[error("nothing says where the LiDAR is (cam_from_lidar): its scans give no ground truth")]
+    /// A bag does not include the LiDAR's mount.
+    #[error("the LiDAR's mount is not given (cam_from_lidar): its scans give no ground truth")]
     LidarUnknown,
-    /// A bag has transforms between frames that are none.
+    /// A bag has invalid transforms between frames.
     #[error(
-        "{} of frames {}",
+        "{} between frames {}",
         count_of(*transforms, "transform"),
         if *transforms == 1 {
-            "has no rotation, or holds NaN, and is left out"
+            "has no rotation or a NaN, and is left out"
         } else {
-            "have no rotation, or hold NaN, and are left out"
+            "have no rotation or a NaN, and are left out"
         }
     )]
     BrokenTransforms {
-        /// How many.
+        /// Number of transforms.
         transforms: usize,
     },
-    /// The frame of a bag's images has the axes of a body: x forward, y left, z up.
+    /// The frame of a bag's images has body axes (x forward, y left, z up) instead of optical ones.
     #[error(
-        "the images' frame {frame} has its z axis up, so it is no optical frame: its x is taken to look ahead and its y to the left"
+        "the images' frame {frame} has its z axis up, so it is not an optical frame: assuming that its x axis points ahead and its y axis to the left"
     )]
     BodyAxes {
-        /// The frame.
+        /// Name of the frame.
         frame: String,
     },
-    /// The frames of a bag do not say a mount that they could be expected to.
+    /// A mount cannot be taken from the bag's frames, although it should be.
     #[error("{mount}: {why}")]
     NotByFrames {
-        /// The mount, by its key in the file beside the bag.
+        /// The mount's key in the file beside the bag.
         mount: &'static str,
-        /// Why not.
+        /// Why it cannot be taken from them.
         why: NotByFrames,
     },
-    /// Two sources say two places of a sensor.
+    /// Two sources disagree on a mount.
     #[error(
-        "{mount}: {taken} and {other} are {} apart; the former is taken",
+        "{mount}: {taken} and {other} are {} apart; the former is used",
         Change { metres: *metres, radians: *radians }
     )]
     Apart {
-        /// The mount, by its key in the file beside the bag.
+        /// The mount's key in the file beside the bag.
         mount: &'static str,
-        /// Who says the place that is taken.
+        /// The source of the mount that is used.
         taken: String,
-        /// Who says the other one.
+        /// The source of the other mount.
         other: String,
-        /// How far apart the two places are.
+        /// Distance between the two positions, in metres.
         metres: f64,
-        /// By how much they are turned against each other.
+        /// Angle between the two orientations, in radians.
         radians: f64,
     },
 }
 
-/// Why the frames of a bag do not say a mount that they could be expected to.
+/// Why a mount cannot be taken from a bag's frames.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NotByFrames {
-    /// None of them has a vehicle's name.
+    /// No frame has a known name for the vehicle.
     #[error(
-        "none of the frames {} is known as the vehicle's ({}); frames.vehicle in {} names it",
+        "none of the frames {} is known as the vehicle's ({}); set frames.vehicle in {}",
         frames.join(", "), known.join(", "), config.display()
     )]
     NoVehicle {
-        /// The frames that there are.
+        /// Names of the bag's frames.
         frames: Vec<String>,
-        /// The names that are known.
+        /// Known names of vehicle frames.
         known: Vec<&'static str>,
-        /// The file beside the bag.
+        /// Path of the file beside the bag.
         config: PathBuf,
     },
-    /// A sensor's messages name a frame that is none of them.
+    /// A sensor's messages name a frame that is in none of the transforms.
     #[error(
-        "the frame of {whose}, {frame}, is in no transform of the bag; frames.{key} in {} names another",
+        "the frame of {whose}, {frame}, is in no transform of the bag; set frames.{key} in {} to another",
         config.display()
     )]
     Absent {
-        /// Whose messages.
+        /// Which messages, as in "the images".
         whose: &'static str,
         /// The frame that they name.
         frame: String,
-        /// The key of `frames` that names another.
+        /// The key of `[frames]` for another frame.
         key: &'static str,
-        /// The file beside the bag.
+        /// Path of the file beside the bag.
         config: PathBuf,
     },
-    /// Something on the way from one to the other moves.
+    /// A transform in the chain between the two frames changes.
     #[error(
-        "the frames {from} and {to} are not fixed to each other: {} moves in {} by up to {}, so it is not taken from them",
+        "the frames {from} and {to} are not fixed to each other ({} moves in {} by up to {}), so the mount is not taken from them",
         moving[0], moving[1], Change { metres: *metres, radians: *radians }
     )]
     Moves {
-        /// The frame of the sensor or the vehicle whose place is wanted.
+        /// The frame of the sensor or vehicle to be located.
         from: String,
-        /// The frame in which it is wanted.
+        /// The frame in which it is to be located.
         to: String,
-        /// The frame that moves, and the one in which it does.
+        /// The frame that moves, and the frame in which it moves.
         moving: [String; 2],
-        /// How far it moves.
+        /// How far it moves, in metres.
         metres: f64,
-        /// By how much it turns.
+        /// How far it turns, in radians.
         radians: f64,
     },
-    /// They are not connected.
+    /// The two frames are not connected.
     #[error("no transforms lead from the frame {from} to {to}")]
     NoWay {
-        /// The frame of the sensor or the vehicle whose place is wanted.
+        /// The frame of the sensor or vehicle to be located.
         from: String,
-        /// The frame in which it is wanted.
+        /// The frame in which it is to be located.
         to: String,
     },
 }
@@ -154,36 +154,36 @@ mod tests {
         for (warning, said) in [
             (
                 MountWarning::NotGiven,
-                "the camera's place on the vehicle is not given ([mount] in dataset.toml): it is taken to look straight ahead and to move \
-                 as the vehicle does",
+                "the camera's mount is not given ([mount] in dataset.toml): assuming that it looks straight ahead from the vehicle's origin",
             ),
             (
                 MountWarning::Aimed(heading),
-                "the camera's place on the vehicle is not given ([mount] in dataset.toml): driving straight, its images show that it looks \
-                 2.0 ± 0.1 degrees down and 1.0 ± 0.1 degrees to the right, and that is taken",
+                "the camera's mount is not given ([mount] in dataset.toml): according to its images when driving straight, it looks \
+                 2.0 ± 0.1 degrees down and 1.0 ± 0.1 degrees to the right, which is used",
             ),
             (
                 MountWarning::OfKittiRaw,
-                "KITTI odometry does not say where the cameras are on the car: their place is taken from KITTI raw's calibration, their \
-                 direction from the way the car goes",
+                "KITTI odometry does not include the cameras' mounts: taking their positions from KITTI raw's calibration, their \
+                 direction from the path",
             ),
             (
                 MountWarning::CameraUnknown,
-                "nothing says where the camera is on the vehicle: it is taken to look ahead and to move as the rear axle does",
+                "the camera's mount is not given: assuming that it looks straight ahead from the rear axle",
             ),
             (
                 broken(1),
-                "1 transform of frames has no rotation, or holds NaN, and is left out",
+                "1 transform between frames has no rotation or a NaN, and is left out",
             ),
             (
                 broken(2),
-                "2 transforms of frames have no rotation, or hold NaN, and are left out",
+                "2 transforms between frames have no rotation or a NaN, and are left out",
             ),
             (
                 MountWarning::BodyAxes {
                     frame: "camera".into(),
                 },
-                "the images' frame camera has its z axis up, so it is no optical frame: its x is taken to look ahead and its y to the left",
+                "the images' frame camera has its z axis up, so it is not an optical frame: assuming that its x axis points ahead and its y axis \
+                 to the left",
             ),
             (
                 MountWarning::Apart {
@@ -193,7 +193,7 @@ mod tests {
                     metres: 0.4,
                     radians: 0.0,
                 },
-                "cam_from_vehicle: drive.toml and frames base_link → camera are 0.400 m and 0.00° apart; the former is taken",
+                "cam_from_vehicle: drive.toml and frames base_link → camera are 0.400 m and 0.00° apart; the former is used",
             ),
         ] {
             assert_eq!(warning.to_string(), said);
@@ -211,7 +211,7 @@ mod tests {
                     known: vec!["base_link", "car"],
                     config: config.clone(),
                 },
-                "none of the frames camera, chassis is known as the vehicle's (base_link, car); frames.vehicle in drive.toml names it",
+                "none of the frames camera, chassis is known as the vehicle's (base_link, car); set frames.vehicle in drive.toml",
             ),
             (
                 NotByFrames::Absent {
@@ -220,7 +220,7 @@ mod tests {
                     key: "camera",
                     config,
                 },
-                "the frame of the images, camera, is in no transform of the bag; frames.camera in drive.toml names another",
+                "the frame of the images, camera, is in no transform of the bag; set frames.camera in drive.toml to another",
             ),
             (
                 NotByFrames::Moves {
@@ -230,8 +230,8 @@ mod tests {
                     metres: 0.0,
                     radians: 0.48,
                 },
-                "the frames base_link and camera are not fixed to each other: pan moves in base_link by up to 0.000 m and 27.50°, so it is \
-                 not taken from them",
+                "the frames base_link and camera are not fixed to each other (pan moves in base_link by up to 0.000 m and 27.50°), so the mount \
+                 is not taken from them",
             ),
             (
                 NotByFrames::NoWay { from, to },

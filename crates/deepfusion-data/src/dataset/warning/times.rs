@@ -1,34 +1,32 @@
-//! What is unsure about when something was measured.
+//! Warnings about times.
 
 use crate::logs::clock::seconds;
 use deepfusion_hint::count_of;
 
-/// What is unsure about when something was measured.
+/// A warning about times.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TimesWarning {
     /// The images have no times.
-    #[error(
-        "nothing says when the images were taken: no frames.csv, no timestamps.txt, no fps in dataset.toml"
-    )]
+    #[error("the images have no times: no frames.csv, no timestamps.txt, no fps in dataset.toml")]
     ImagesUntimed,
-    /// The images' times are their names, which look like dates.
-    #[error("the images' names are their times, in {unit}")]
+    /// The images' times are taken from their names, which look like dates.
+    #[error("the images' times are taken from their names, in {unit}")]
     ImagesByName {
-        /// The unit, by its sign.
+        /// The unit's symbol.
         unit: &'static str,
     },
-    /// A table does not say the unit of its times.
-    #[error("{table}: column {column} has no unit, taken as {unit} by its numbers")]
+    /// A table does not state the unit of its times.
+    #[error("{table}: column {column} has no unit, assuming {unit} from its numbers")]
     NoUnit {
         /// The table's name.
         table: String,
         /// The column's header.
         column: String,
-        /// The unit that is taken, by its sign.
+        /// Symbol of the assumed unit.
         unit: &'static str,
     },
-    /// Rows of a table have the time of the row above.
+    /// Rows of a table repeat the time of the row above.
     #[error(
         "{table}: {} {} the time of the row above ({} {line}) and {} left out",
         count_of(*rows, "row"),
@@ -39,14 +37,14 @@ pub enum TimesWarning {
     Repeated {
         /// The table's name.
         table: String,
-        /// How many rows.
+        /// Number of rows.
         rows: usize,
-        /// The line of the first, counted from 1.
+        /// The line of the first of them, counted from 1.
         line: u64,
     },
-    /// The times of a log, or of a list of the frames' times, are dates without a zone.
+    /// The times of a log or of a list of frame times are dates without a time zone.
     #[error(
-        "{log}: its dates have no zone and are taken for UTC (start_s in dataset.toml moves the frames)"
+        "{log}: its dates have no time zone, assuming UTC (start_s in dataset.toml shifts the frames)"
     )]
     NoZone {
         /// The name of the log or the list.
@@ -55,72 +53,72 @@ pub enum TimesWarning {
     /// A video's frames have no times.
     #[error("the video has no time stamps: set fps in dataset.toml")]
     VideoUntimed,
-    /// A video's times count from its beginning, and only its recorder says when that was.
+    /// A video's times count from its beginning, which is taken from the recorder's date.
     #[error(
-        "the video is taken to begin at {}, as its recorder says (start_s = {:.3} in dataset.toml; another moves it)",
+        "the video is assumed to begin at {}, its recorder's date (start_s = {:.3} in dataset.toml; another value shifts it)",
         date(*start_ns),
         seconds(*start_ns, 0)
     )]
     VideoBegins {
-        /// When it is taken to begin, nanoseconds since 1970.
+        /// Assumed beginning, nanoseconds since 1970.
         start_ns: i64,
     },
-    /// Nothing of a video is within its log by what its recorder says.
-    #[error("by its recorder's date nothing of the video is within the log{}", moved(*moved_ns))]
+    /// According to the recorder's date, a video does not overlap with its log.
+    #[error("according to its recorder's date, no part of the video is within the log{}", moved(*moved_ns))]
     VideoBesideLog {
-        /// When it began, where the date is one of a local clock and by a single zone's time it is within the log, nanoseconds since 1970.
+        /// Beginning of the video if the date is local time, nanoseconds since 1970; `None` unless a single time zone fits the log best.
         moved_ns: Option<i64>,
     },
-    /// The date of a video is of a recorder that writes local time, and the log does not show that this was UTC.
+    /// The recorder writes local time, and the log does not show that this was UTC.
     #[error(
-        "a {model} writes the time of its own zone, which is taken for UTC: the video may begin hours off (start_s in dataset.toml moves it)"
+        "a {model} writes local time, which is assumed to be UTC: the video's beginning may be wrong by hours (start_s in dataset.toml shifts it)"
     )]
     LocalRecorder {
-        /// The camera.
+        /// The camera's model.
         model: String,
     },
-    /// Nothing says that a video and the tables beside it have one clock.
+    /// It is only assumed that a video and the tables beside it have the same clock.
     #[error(
-        "the video's time stamps are taken to be on the tables' clock (start_s in dataset.toml moves them)"
+        "the video's time stamps are assumed to be on the tables' clock (start_s in dataset.toml shifts them)"
     )]
     VideoOnTablesClock,
-    /// A video and the list of its frames' times are of different lengths.
+    /// A video and the list of its frames' times have different lengths.
     #[error(
-        "{list} has {}, {video} {}: the first {} are taken",
+        "{list} has {}, {video} {}: using the first {}",
         count_of(*times, "time"),
         count_of(*frames, "frame"),
         usize::min(*times, *frames)
     )]
     OtherCount {
-        /// The file of the times.
+        /// Name of the file of times.
         list: &'static str,
-        /// How many times it has.
+        /// Number of times in it.
         times: usize,
-        /// The video.
+        /// Name of the video.
         video: &'static str,
-        /// How many frames it has.
+        /// Number of its frames.
         frames: usize,
     },
     /// The headers of a topic's messages have no time.
     #[error(
-        "{topic}: {} {}; the time of recording is used, which is late by the transport delay",
+        "{topic}: {} {}; using the time of recording, which is later by the transport delay",
         count_of(*messages, "message"),
-        if *messages == 1 { "has no time in its header" } else { "have no time in their header" }
+        if *messages == 1 { "has no time in its header" } else { "have no time in their headers" }
     )]
     Unstamped {
-        /// The topic.
+        /// Name of the topic.
         topic: String,
-        /// How many of its messages.
+        /// Number of such messages.
         messages: usize,
     },
 }
 
-/// What follows where a video's date may be one of a local clock.
+/// End of the warning: what to do if the video's date may be local time.
 fn moved(start_ns: Option<i64>) -> String {
     match start_ns {
-        None => ": start_s in dataset.toml says when it begins".to_owned(),
+        None => ": set start_s in dataset.toml to its beginning".to_owned(),
         Some(ns) => format!(
-            ": it may be local time, of which {} in UTC is within (start_s = {:.3} in dataset.toml)",
+            ": it may be local time; the video then begins at {} (start_s = {:.3} in dataset.toml)",
             date(ns),
             seconds(ns, 0)
         ),
@@ -150,11 +148,11 @@ mod tests {
         for (warning, said) in [
             (
                 TimesWarning::ImagesUntimed,
-                "nothing says when the images were taken: no frames.csv, no timestamps.txt, no fps in dataset.toml",
+                "the images have no times: no frames.csv, no timestamps.txt, no fps in dataset.toml",
             ),
             (
                 TimesWarning::ImagesByName { unit: "ns" },
-                "the images' names are their times, in ns",
+                "the images' times are taken from their names, in ns",
             ),
             (
                 TimesWarning::NoUnit {
@@ -162,7 +160,7 @@ mod tests {
                     column: "timestamp".into(),
                     unit: "us",
                 },
-                "speed.csv: column timestamp has no unit, taken as us by its numbers",
+                "speed.csv: column timestamp has no unit, assuming us from its numbers",
             ),
             (
                 repeated(1),
@@ -176,36 +174,36 @@ mod tests {
                 TimesWarning::NoZone {
                     log: "trip.csv".into(),
                 },
-                "trip.csv: its dates have no zone and are taken for UTC (start_s in dataset.toml moves the frames)",
+                "trip.csv: its dates have no time zone, assuming UTC (start_s in dataset.toml shifts the frames)",
             ),
             (
                 TimesWarning::VideoBegins {
                     start_ns: 1_700_000_000_000_000_000,
                 },
-                "the video is taken to begin at 2023-11-14T22:13:20Z, as its recorder says (start_s = 1700000000.000 in dataset.toml; \
-                 another moves it)",
+                "the video is assumed to begin at 2023-11-14T22:13:20Z, its recorder's date (start_s = 1700000000.000 in dataset.toml; \
+                 another value shifts it)",
             ),
             (
                 TimesWarning::VideoBesideLog { moved_ns: None },
-                "by its recorder's date nothing of the video is within the log: start_s in dataset.toml says when it begins",
+                "according to its recorder's date, no part of the video is within the log: set start_s in dataset.toml to its beginning",
             ),
             (
                 TimesWarning::VideoBesideLog {
                     moved_ns: Some(1_700_000_000_000_000_000),
                 },
-                "by its recorder's date nothing of the video is within the log: it may be local time, of which \
-                 2023-11-14T22:13:20Z in UTC is within (start_s = 1700000000.000 in dataset.toml)",
+                "according to its recorder's date, no part of the video is within the log: it may be local time; the video then begins at \
+                 2023-11-14T22:13:20Z (start_s = 1700000000.000 in dataset.toml)",
             ),
             (
                 TimesWarning::LocalRecorder {
                     model: "HERO11 Black".into(),
                 },
-                "a HERO11 Black writes the time of its own zone, which is taken for UTC: the video may begin hours off (start_s in \
-                 dataset.toml moves it)",
+                "a HERO11 Black writes local time, which is assumed to be UTC: the video's beginning may be wrong by hours (start_s in \
+                 dataset.toml shifts it)",
             ),
             (
                 TimesWarning::VideoOnTablesClock,
-                "the video's time stamps are taken to be on the tables' clock (start_s in dataset.toml moves them)",
+                "the video's time stamps are assumed to be on the tables' clock (start_s in dataset.toml shifts them)",
             ),
             (
                 TimesWarning::OtherCount {
@@ -214,15 +212,15 @@ mod tests {
                     video: "video.hevc",
                     frames: 12,
                 },
-                "global_pose/frame_times has 1 time, video.hevc 12 frames: the first 1 are taken",
+                "global_pose/frame_times has 1 time, video.hevc 12 frames: using the first 1",
             ),
             (
                 unstamped(1),
-                "/imu: 1 message has no time in its header; the time of recording is used, which is late by the transport delay",
+                "/imu: 1 message has no time in its header; using the time of recording, which is later by the transport delay",
             ),
             (
                 unstamped(25),
-                "/imu: 25 messages have no time in their header; the time of recording is used, which is late by the transport delay",
+                "/imu: 25 messages have no time in their headers; using the time of recording, which is later by the transport delay",
             ),
         ] {
             assert_eq!(warning.to_string(), said);

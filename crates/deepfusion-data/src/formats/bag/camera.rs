@@ -1,4 +1,4 @@
-//! The camera of a bag: its lens.
+//! Finds the camera and lens of a bag.
 
 use super::config::BagConfig;
 use super::index::Index;
@@ -14,12 +14,12 @@ use deepfusion_rosbag::MessageSource;
 use deepfusion_rosbag::msg::CameraInfo;
 use std::path::{Path, PathBuf};
 
-/// The camera by what is given, by the file beside the bag, by CameraInfo, as the profile prints it, or as it is to be assumed: then the
-/// last is true.
+/// The camera from the options, the file beside the bag, CameraInfo, the profile or the assumed camera, in this order. The returned flag
+/// is true for an assumed camera.
 ///
 /// # Errors
-/// [`Error::CameraFile`] where nothing says it or it cannot be; [`Error::FrameSize`] where it is of another size than the first
-/// image.
+/// [`Error::NoBagCamera`] if there is none of these, [`Error::CameraFile`] if the camera is invalid, [`Error::FrameSize`] if its size
+/// differs from that of the first image.
 pub(super) fn find(
     messages: &dyn MessageSource,
     topics: &Topics,
@@ -41,7 +41,7 @@ pub(super) fn find(
         let given = Intrinsics::from_numbers(numbers, (width, height));
         let place = CalibrationPlace {
             source: CalibrationSource::Given,
-            field: "the first image's size, for want of one",
+            field: "the first image's size, as none is given",
         };
         (pinhole(given), place)
     } else if let Some(file) = &options.calibration {
@@ -75,7 +75,7 @@ pub(super) fn find(
         problem: problem.into(),
     };
     let (camera, distortion) = camera.map_err(wrong)?;
-    // Before the lens, which takes memory for each pixel.
+    // Check before the lens is built, which needs memory for each pixel.
     if (camera.width, camera.height) != (width, height) {
         return Err(Error::FrameSize {
             image: format!("{}, image 0", bag.display()),
@@ -112,7 +112,7 @@ fn calibrated(
     rectified: bool,
 ) -> Result<CameraCalibration> {
     let calibration = CameraCalibration::read(file, size)?;
-    // Such a file is of the raw images: rectified ones have another matrix, and no distortion left to take out.
+    // Such a file describes the raw images. Rectified ones have another matrix and no distortion.
     if rectified && !calibration.distortion.is_none() {
         return Err(Error::CameraFile {
             by: file.into(),
@@ -124,13 +124,14 @@ fn calibrated(
     Ok(calibration)
 }
 
-/// Of rectified images P without distortion, of raw ones K with it. A message that says no size is one of the images'.
-/// Whether a topic's name says that its images are rectified: `/camera/image_rect_color`, `/rectified/image`, not `/direct/image`.
+/// Whether a topic has rectified images according to its name: `/camera/image_rect_color`, `/rectified/image`, but not `/direct/image`.
 fn is_rectified(topic: &str) -> bool {
     let mut words = topic.split(['/', '_', '-', '.']);
     words.any(|word| word == "rect" || word.starts_with("rectif"))
 }
 
+/// The camera in a CameraInfo message: P without distortion for rectified images, K with distortion for raw ones. A message without a
+/// size has that of the images.
 fn of_camera_info(
     info: &CameraInfo,
     image_size: (u32, u32),
@@ -146,7 +147,7 @@ fn of_camera_info(
         return Ok((of(p[0], p[5], p[2], p[6]), Distortion::default()));
     }
     if rectified && info.d.iter().any(|d| *d != 0.0) {
-        // K and D are of the images as they were: their distortion would be taken out twice.
+        // K and D describe the raw images, so the distortion would be corrected twice.
         return Err(CameraInfoProblem::NoProjection);
     }
     let known = ["plumb_bob", "rational_polynomial", ""];
@@ -220,7 +221,7 @@ mod tests {
         };
         assert_eq!(lens("equidistant", &d).intrinsics(), fisheye);
         assert_eq!(lens("plumb_bob", &d).intrinsics(), brown);
-        // An equidistant lens without coefficients is still one; without distortion a camera is a pinhole.
+        // An equidistant lens is a fisheye even with all coefficients 0; a camera without distortion is a pinhole.
         assert!(lens("equidistant", &[0.0; 4]).distorts());
         assert!(!lens("plumb_bob", &[]).distorts());
         let sizeless = CameraInfo {

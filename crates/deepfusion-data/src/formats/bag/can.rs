@@ -1,4 +1,4 @@
-//! Speed and steering out of CAN frames: which signals the file beside a bag names, and what a frame says of them.
+//! Speed and steering from CAN frames, by the signals named in the file beside a bag.
 
 use super::can_config::SignalConfig;
 use super::config::BagConfig;
@@ -14,7 +14,7 @@ pub(super) struct Can {
     steering: Option<(CanSignal, f64)>,
 }
 
-/// What a frame says, with its time in nanoseconds.
+/// The values in one frame, with its time in nanoseconds.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct CanReading {
     pub(super) speed_mps: Option<(i64, f64)>,
@@ -25,7 +25,7 @@ impl Can {
     /// The signals of the file beside a bag.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] for a DBC file, a signal or a unit that is missing or cannot be.
+    /// [`crate::Error::Config`] for a missing or invalid DBC file, signal or unit.
     pub(super) fn of(config: &BagConfig) -> Result<Self> {
         let Some(can) = &config.can else {
             return Ok(Self::default());
@@ -80,7 +80,7 @@ impl Can {
         Ok(Self { speed, steering })
     }
 
-    /// What a frame of this time says. Remote requests and error frames carry no values, whatever their bytes.
+    /// The values in a frame of this time. Remote requests and error frames carry no values, whatever their bytes.
     pub(super) fn read(&self, frame: &Frame, time_ns: i64) -> CanReading {
         let id = if frame.is_extended {
             Some(CanId::Extended { extended: frame.id })
@@ -107,7 +107,7 @@ impl Can {
         }
     }
 
-    /// Leaves out values beyond their signal's range ([`CanSignal::keep_measured`]), with a warning each.
+    /// Leaves out values outside their signal's range ([`CanSignal::keep_measured`]), with a warning for each signal.
     pub(super) fn keep_measured(
         &self,
         speeds: &mut Vec<(i64, f64)>,
@@ -131,7 +131,7 @@ impl Can {
         warnings
     }
 
-    /// Signals without a value: they are configured, so no other source was looked for.
+    /// Warnings about configured signals without any value, for which no other source was looked for.
     pub(super) fn silent(&self, speeds: usize, angles: usize) -> Vec<DataWarning> {
         let signals = [
             ("can.speed", &self.speed, speeds),
@@ -147,7 +147,7 @@ impl Can {
     }
 }
 
-/// What no frame can hold, by field.
+/// Refuses signals that do not fit into a frame.
 fn check(signal: &CanSignal, key: &'static str) -> std::result::Result<(), CanProblem> {
     match signal.id {
         CanId::Standard(id) if id > HIGHEST_STANDARD => {

@@ -1,4 +1,4 @@
-//! `[can]` of the file beside a bag: which signals of CAN frames are speed and steering.
+//! `[can]` of the file beside a bag: the CAN signals for speed and steering.
 
 use deepfusion_motion::can::{CanSignal, Dbc};
 use serde::de::value::MapAccessDeserializer;
@@ -7,20 +7,20 @@ use serde::{Deserialize, Deserializer};
 use std::fmt;
 use std::path::PathBuf;
 
-/// `[can]`: signals of CAN frames.
+/// The table `[can]`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CanConfig {
-    /// The DBC file, beside this one; needed for signals that are named.
+    /// Path of the DBC file, relative to this file; needed for signals given by name.
     pub(super) dbc: Option<PathBuf>,
     pub(super) speed: Option<SignalConfig>,
     pub(super) speed_unit: Option<SpeedUnit>,
     pub(super) steering: Option<SignalConfig>,
-    /// Radians for one unit of the steering signal: 0.0174533 where it is in degrees.
+    /// Radians per unit of the steering signal: 0.0174533 if it is in degrees.
     pub(super) steering_rad: Option<f64>,
 }
 
-/// A signal: `Message.Signal` of the DBC file, or written out.
+/// A signal: the name `Message.Signal` in the DBC file, or a full definition.
 #[derive(Debug, Clone)]
 pub(super) enum SignalConfig {
     Named(String),
@@ -49,7 +49,7 @@ impl SpeedUnit {
 }
 
 impl SignalConfig {
-    /// The unit that the DBC file gives a signal it names.
+    /// The unit in the DBC file, for a signal given by name.
     pub(super) fn unit(&self, dbc: &Dbc) -> Option<SpeedUnit> {
         match self {
             Self::Named(name) => unit_of(dbc.unit(name)?),
@@ -67,7 +67,7 @@ fn unit_of(text: &str) -> Option<SpeedUnit> {
     }
 }
 
-/// By hand, as an untagged enum says nothing of the field that is wrong.
+/// Written by hand, because the errors of an untagged enum do not name the wrong field.
 impl<'de> Deserialize<'de> for SignalConfig {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
         struct SignalVisitor;
@@ -76,7 +76,7 @@ impl<'de> Deserialize<'de> for SignalConfig {
             type Value = SignalConfig;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("\"Message.Signal\" of the DBC file, or { id = …, layout = { … } }")
+                f.write_str("\"Message.Signal\" from the DBC file, or { id = …, layout = { … } }")
             }
 
             fn visit_str<E: serde::de::Error>(

@@ -1,13 +1,13 @@
-//! Which topics say what a vehicle was asked for, not what it did: ROS 2's controllers publish both with messages of one type.
+//! Recognises topics with commands to a vehicle instead of measurements: ROS 2's controllers publish both with the same message type.
 
 /// Words in the names of such topics.
 const WORDS: [&str; 7] = [
     "cmd", "command", "commands", "setpoint", "target", "teleop", "joy",
 ];
-/// What other words may run into.
+/// Parts of names that may continue with other letters.
 const PARTS: [&str; 2] = ["cmd_vel", "nav_vel"];
 
-/// Whether a topic's name says that it is what the vehicle was asked for.
+/// Whether a topic has commands, according to its name.
 pub(super) fn is_command(name: &str) -> bool {
     let name = name.to_lowercase();
     let mut words = name.split(['/', '_']);

@@ -1,4 +1,4 @@
-//! The file beside a bag, `<bag>.toml` or `bag.toml` for all bags of a folder: what the bag does not say.
+//! The file beside a bag, `<bag>.toml`, or `bag.toml` for all bags of a folder: settings for what the bag does not contain.
 
 use super::can_config::{CanConfig, SpeedUnit};
 use super::profile;
@@ -10,60 +10,60 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// The file for every bag of a folder that has none of its own.
+/// Name of the file for every bag in a folder that has no file of its own.
 const OF_FOLDER: &str = "bag.toml";
 
-/// Everything that can be said. All of it is optional; docs/reference/bag-toml.md explains each key.
+/// All settings. Every key is optional; docs/reference/bag-toml.md explains them.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct BagConfig {
-    /// A data set's published numbers, where the bag has none: `umad`.
+    /// Name of a data set's published calibration, used for what the bag does not have: `umad`.
     pub(super) profile: Option<String>,
-    /// The kind of drive, for one row each in the evaluation.
+    /// The kind of drive; an evaluation has a row for each.
     pub(super) scenario: Option<String>,
-    /// Whether a simulator wrote the bag; where nothing is said, its topics decide.
+    /// Whether the bag is simulated; if not set, its topics decide.
     pub(super) simulated: Option<bool>,
-    /// Topics by name, where the type does not decide.
+    /// Topics by name, if their types are ambiguous.
     pub(super) topics: TopicNames,
-    /// A camera without distortion, where there is no CameraInfo.
+    /// A camera without distortion, if there is no CameraInfo.
     pub(super) camera: Option<CameraConfig>,
-    /// Where the frames of a video stream are kept once decoded, from this file's folder.
+    /// Path of the folder for a video stream's decoded frames, relative to this file's folder.
     pub(super) cache: Option<PathBuf>,
-    /// A calibration tool's file, from this one's folder.
+    /// Path of a calibration file, relative to this file's folder.
     pub(super) calibration: Option<PathBuf>,
-    /// Frames of `/tf_static` and `/tf` by name, where neither messages nor usual names decide.
+    /// Frames of `/tf_static` and `/tf` by name, if they are neither in the messages nor have usual names.
     pub(super) frames: FrameNames,
-    /// A point of the LiDAR in the camera.
+    /// The transform from the LiDAR to the camera.
     pub(super) cam_from_lidar: Option<Transform>,
-    /// A point of the vehicle (middle of the rear axle; x forward, y left, z up) in the camera.
+    /// The transform from the vehicle (middle of the rear axle; x forward, y left, z up) to the camera.
     pub(super) cam_from_vehicle: Option<Transform>,
-    /// A point of the inertial unit in the vehicle.
+    /// The transform from the inertial unit to the vehicle.
     pub(super) vehicle_from_imu: Option<Transform>,
-    /// The vehicle's geometry.
+    /// The vehicle's geometry and speed.
     pub(super) vehicle: VehicleConfig,
-    /// The LiDAR's ways.
+    /// How to read the LiDAR's scans.
     pub(super) lidar: LidarConfig,
-    /// Clocks and how near in time two sensors must be.
+    /// The clock offset, and the largest time between a scan and its frame.
     pub(super) clock: ClockConfig,
     /// Signals of CAN frames.
     pub(super) can: Option<CanConfig>,
     /// Weights of the sensors in the motion.
     pub(super) fusion: FusionConfig,
-    /// The profile's camera, where nothing else says one.
+    /// The profile's camera, used if there is no other.
     #[serde(skip)]
     pub(super) profile_camera: Option<CameraConfig>,
-    /// The profile's mounts that the file does not have: they go behind the bag's own frames.
+    /// The profile's mounts that the file does not have; the bag's own frames take precedence.
     #[serde(skip)]
     pub(super) profile_mounts: MountConfig,
     /// The roles whose topics the caller named.
     #[serde(skip)]
     pub(super) given_topics: Vec<TopicRole>,
-    /// Where it was read from; the path it would have where there is none.
+    /// Path from which it was read, or at which it would be if it existed.
     #[serde(skip)]
     pub(super) path: PathBuf,
 }
 
-/// Where the sensors are.
+/// The sensors' mounts.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct MountConfig {
@@ -72,18 +72,18 @@ pub(super) struct MountConfig {
     pub(super) vehicle_from_imu: Option<Transform>,
 }
 
-/// Frames by name.
+/// Names of frames.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct FrameNames {
-    /// Below or at the middle of the rear axle; x forward, y left, z up.
+    /// The vehicle's frame, at or below the middle of the rear axle; x forward, y left, z up.
     pub(super) vehicle: Option<String>,
     pub(super) camera: Option<String>,
     pub(super) lidar: Option<String>,
     pub(super) imu: Option<String>,
 }
 
-/// Topics by name; [`NamedTopic::NONE`] for none.
+/// Names of topics; [`NamedTopic::NONE`] to read none.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct TopicNames {
@@ -99,7 +99,7 @@ pub(super) struct TopicNames {
 }
 
 impl TopicNames {
-    /// The name for a role.
+    /// The topic's name for a role.
     pub(super) fn of(&self, role: TopicRole) -> Option<&str> {
         let name = match role {
             TopicRole::Image => &self.image,
@@ -115,13 +115,13 @@ impl TopicNames {
         name.as_deref()
     }
 
-    /// Whether nothing is to be read for a role.
+    /// Whether no topic is to be read for a role.
     pub(super) fn is_none(&self, role: TopicRole) -> bool {
         role.is_optional() && self.of(role) == Some(NamedTopic::NONE)
     }
 }
 
-/// A camera by four numbers and its image's size.
+/// A camera given by four intrinsics and the image size.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CameraConfig {
@@ -133,7 +133,7 @@ pub(super) struct CameraConfig {
     pub(super) height: u32,
 }
 
-/// A rigid motion: metres, and an axis-angle vector in radians.
+/// A rigid transform: translation in metres, rotation as an axis-angle vector in radians.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Transform {
@@ -142,35 +142,35 @@ pub(super) struct Transform {
     pub(super) rotation: [f64; 3],
 }
 
-/// The vehicle's geometry, and the unit of a bare number as its speed.
+/// The vehicle's geometry, and how to read its speed.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct VehicleConfig {
     pub(super) wheelbase_m: Option<f64>,
-    /// True speed over the vehicle's: worn tyres read too fast.
+    /// True speed / measured speed: worn tyres give too high a speed.
     pub(super) speed_scale: Option<f64>,
-    /// Steering wheel's angle over road wheels'; without it the signal is the road wheels' angle.
+    /// Angle of the steering wheel / angle of the road wheels; if not set, the signal is the road wheels' angle.
     pub(super) steering_ratio: Option<f64>,
     pub(super) steering_offset_rad: f64,
-    /// Needed where the speed is a Float32 or Float64.
+    /// Unit of the speed; required if its messages are Float32 or Float64.
     pub(super) speed_unit: Option<SpeedUnit>,
-    /// Longest gap between satellite positions across which their speed is a straight line, in seconds.
+    /// Longest gap between GPS positions across which the speed is interpolated linearly, in seconds.
     pub(super) max_gap_s: Option<f64>,
 }
 
-/// The LiDAR's ways.
+/// How to read the LiDAR's scans.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct LidarConfig {
-    /// The field of the radial velocity; without it the usual names are tried.
+    /// Name of the field of the radial velocity; if not set, the usual names are tried.
     pub(super) velocity_field: Option<String>,
-    /// The field of the points' own times, where the vehicle's motion is still in a scan.
+    /// Name of the field of the points' own times, for scans that are not compensated for the vehicle's motion.
     pub(super) time_field: Option<String>,
-    /// The sign of a point that recedes.
+    /// The sign of a receding point's velocity.
     pub(super) receding: Sign,
-    /// Whether the sensor already took its own velocity out.
+    /// Whether the sensor already subtracts its own velocity.
     pub(super) over_ground: bool,
-    /// Speed over ground along the ray from which a point moves, m/s.
+    /// Speed over ground along the ray from which a point counts as moving, m/s.
     pub(super) moving_mps: f64,
 }
 
@@ -194,14 +194,14 @@ pub(super) enum Sign {
     Negative,
 }
 
-/// Clocks.
+/// Offset and tolerance of the clocks.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ClockConfig {
-    /// How far the clock of camera and LiDAR is ahead of the vehicle's, in seconds; taken off their stamps.
-    /// [`crate::OpenOptions::camera_ahead_s`] goes before it.
+    /// How far the clock of camera and LiDAR is ahead of the vehicle's, in seconds; subtracted from their stamps.
+    /// [`crate::OpenOptions::camera_ahead_s`] takes precedence.
     pub(super) camera_ahead_s: f64,
-    /// A scan belongs to a frame if they are no farther apart, in seconds.
+    /// Largest time between a frame and its scan, in seconds.
     pub(super) scan_within_s: f64,
 }
 
@@ -214,13 +214,13 @@ impl Default for ClockConfig {
     }
 }
 
-/// Whether the file beside a bag says that the bag is simulated. One that cannot be read says nothing.
+/// Whether the file beside a bag marks the bag as simulated; false if the file cannot be read.
 pub(crate) fn says_simulated(bag: &Path) -> bool {
     BagConfig::of(bag, &OpenOptions::default()).is_ok_and(|config| config.simulated == Some(true))
 }
 
 impl BagConfig {
-    /// Reads the file beside a bag, with what a caller says in its place; where there is none, nothing is said.
+    /// Reads the file beside a bag, if any; the caller's options take precedence.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
@@ -231,7 +231,7 @@ impl BagConfig {
         Ok(config)
     }
 
-    /// Names a topic. A signal that the file has for the same quantity is not read then.
+    /// Sets a topic's name. A CAN signal in the file for the same quantity is then not read.
     fn name(&mut self, NamedTopic { role, topic }: &NamedTopic) {
         let names = &mut self.topics;
         let place = match role {
@@ -257,14 +257,14 @@ impl BagConfig {
 
     fn beside(bag: &Path) -> Result<Self> {
         let mut candidates = Self::candidates(bag);
-        // Of a link, the file beside what it leads to, where the link has none beside itself.
+        // If there is no file beside a link, use the one beside its target.
         if let Ok(real) = bag.canonicalize() {
             candidates.extend(Self::candidates(&real));
         }
         let there = candidates.iter().find(|path| path.is_file());
-        // Where there is none, the first is where one would be looked for.
+        // Without any file, use the path of the first candidate.
         let path = there.or(candidates.first()).cloned().unwrap_or_default();
-        // Read alone first: what is wrong with it is then reported with its line.
+        // Read it without the profile first, so that an error names its line.
         let mut config: Self = crate::dataset_toml::read_or_default(&path)?;
         if let Some(name) = &config.profile {
             let own = crate::dataset_toml::read_or_default(&path)?;
@@ -280,10 +280,10 @@ impl BagConfig {
         Ok(config)
     }
 
-    /// The table of a bag's file over the profile of this name; `None` where there is no such profile.
+    /// A bag's file completed by the profile of this name; `None` if there is no such profile.
     ///
     /// # Errors
-    /// What of either is no such file.
+    /// If the result is not a valid configuration.
     pub(super) fn over_profile(
         own: toml::Table,
         name: &str,
@@ -297,13 +297,13 @@ impl BagConfig {
         }))
     }
 
-    /// Where a bag's file is looked for, in this order.
+    /// Paths at which a bag's file is looked for, in this order.
     pub(super) fn candidates(bag: &Path) -> Vec<PathBuf> {
         let shared = bag.with_file_name(OF_FOLDER);
         if !bag.is_dir() {
             return vec![bag.with_extension("toml"), shared];
         }
-        // A bag of ROS 2 is a folder: within it, beside it under its whole name, or for all of the folder above.
+        // A ROS 2 bag is a folder: the file is in it, beside it under its full name, or for all bags of the folder above.
         let mut own = bag.as_os_str().to_owned();
         own.push(".toml");
         vec![bag.join(OF_FOLDER), PathBuf::from(own), shared]
@@ -361,7 +361,7 @@ impl BagConfig {
         }
     }
 
-    /// Where files that it names are looked for.
+    /// The folder to which the paths in this file are relative.
     pub(super) fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(&self.path)
     }

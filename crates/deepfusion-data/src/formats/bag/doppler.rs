@@ -1,41 +1,41 @@
-//! Dynamic points, from the radial velocities of a frequency-modulated LiDAR.
+//! Dynamic points from the radial velocities of a frequency-modulated LiDAR.
 //!
-//! A point that stands still comes nearer as fast as the sensor moves towards it: v_r = −v·d̂, v the sensor's velocity
-//! over ground and d̂ the ray. Most of a scan stands still, so v follows from the scan itself by least squares; what
-//! is left, v_r + v·d̂, is the point's own speed along the ray.
+//! A static point approaches as fast as the sensor moves towards it: v_r = −v·d̂, where v is the sensor's velocity
+//! over ground and d̂ the ray. Most of a scan is static, so v follows from the scan itself by least squares. The
+//! residual v_r + v·d̂ is the point's own speed along the ray.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Residuals below this are noise, m/s: the weight of a larger one falls (Cauchy).
+/// Residuals below this are noise, m/s; larger ones get a smaller weight (Cauchy).
 const NOISE_MPS: f64 = 0.15;
-/// A residual beyond this does not stand still.
+/// Points with a larger residual are dynamic, m/s.
 const INLIER_MPS: f64 = 0.3;
 /// Rounds of reweighting.
 const ROUNDS: usize = 12;
-/// Fewer points determine nothing.
+/// Fewest points for an estimate.
 const LEAST_POINTS: usize = 30;
-/// Points looked at; a scan of 10⁵ says no more than every tenth of them.
+/// Most points used: all 10⁵ points of a scan give no better estimate than every tenth.
 const ENOUGH_POINTS: usize = 8000;
 
-/// The sensor's own velocity, by its scan.
+/// The sensor's own velocity, estimated from its scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DopplerEgo {
-    /// Over ground, in the sensor's axes, m/s.
+    /// Velocity over ground, in the sensor's axes, m/s.
     pub velocity: Vector3<f64>,
-    /// Share of the points that agree with it.
+    /// Fraction of the points that agree with it.
     pub static_share: f64,
-    /// Root mean square of what is left in those, m/s.
+    /// Root mean square of the residuals of those points, m/s.
     pub rms_mps: f64,
 }
 
-/// The velocity of the sensor over ground by robust least squares of v_r = −v·d̂. `start` is where to begin: what the
-/// vehicle says, or nothing.
+/// The velocity of the sensor over ground by robust least squares of v_r = −v·d̂. `start` is the initial value, such as
+/// the vehicle's velocity.
 ///
 /// # Shapes
-/// - `xyz`: points in the sensor's axes, metres; `radial`: one a point, m/s, receding is positive
+/// - `xyz`: points in the sensor's axes, metres; `radial`: one value per point, m/s, receding is positive
 ///
-/// `None` for fewer than 30 usable points, or rays too alike to tell three components apart (the component that no
-/// ray sees is then taken from `start`, if there is one).
+/// `None` for fewer than 30 usable points, or if the rays are too similar to determine three components (a component that no
+/// ray shows is then taken from `start`, if given).
 #[must_use]
 pub fn ego_velocity(
     xyz: &[[f32; 3]],
@@ -54,13 +54,13 @@ pub fn ego_velocity(
         return None;
     }
     let prior = start.unwrap_or_default();
-    // A start that nobody gave must not hold the estimate back.
+    // The pull towards the start must be negligible if none was given.
     let hold = if start.is_some() { 1e-3 } else { 1e-9 } * rays.len() as f64;
     let mut velocity = match start {
         Some(start) => start,
         None => median_start(&rays),
     };
-    // From coarse to fine, so that a wrong start is left behind.
+    // From coarse to fine, so that a wrong start is overcome.
     for round in 0..ROUNDS {
         let scale = NOISE_MPS * 2.0_f64.powi((6 - round as i32).max(0));
         let (mut m, mut y) = (Matrix3::identity() * hold, prior * hold);
@@ -82,7 +82,7 @@ pub fn ego_velocity(
     })
 }
 
-/// A start from the rays most nearly ahead: the median of −v_r / cos.
+/// An initial value from the rays nearest to straight ahead: the median of −v_r / cos.
 fn median_start(rays: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     let mut speeds: Vec<f64> = rays
         .iter()
@@ -94,8 +94,8 @@ fn median_start(rays: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     Vector3::new(forward, 0.0, 0.0)
 }
 
-/// Each point's own speed along its ray, v_r + v·d̂, m/s, receding is positive: 0 for what stands still. NaN where the
-/// point or its velocity is none.
+/// Each point's own speed along its ray, v_r + v·d̂, m/s, receding is positive: 0 for static points. NaN for invalid
+/// points or velocities.
 #[must_use]
 pub fn ground_radial(xyz: &[[f32; 3]], radial: &[f32], sensor_velocity: &Vector3<f64>) -> Vec<f32> {
     let own = |(point, radial): (&[f32; 3], &f32)| match ray(point) {
@@ -115,7 +115,7 @@ fn ray(point: &[f32; 3]) -> Option<Vector3<f64>> {
 mod tests {
     use super::*;
 
-    /// Rays of a scanner that looks ahead, some of whose points move.
+    /// Rays of a forward-looking scanner, some of whose points move.
     fn scan(velocity: Vector3<f64>, moving: f64) -> (Vec<[f32; 3]>, Vec<f32>) {
         let (mut xyz, mut radial) = (Vec::new(), Vec::new());
         for i in 0..3000 {

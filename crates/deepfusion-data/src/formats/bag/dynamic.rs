@@ -1,4 +1,4 @@
-//! The topic of dynamic points beside a LiDAR: those points of a scan that its driver calls moving.
+//! The topic of dynamic points beside a LiDAR: those points of a scan that its driver marks as moving.
 
 use super::index::{MessageRef, nearest};
 use super::scan::usable;
@@ -7,35 +7,35 @@ use crate::Result;
 use deepfusion_rosbag::MessageSource;
 use nalgebra::Vector3;
 
-/// A listed point is the scan's point nearest to it, up to this distance, metres: a driver may round.
+/// Largest distance between a listed point and the matching point of the scan, metres: a driver may round.
 const APART_M: f32 = 0.01;
-/// Of the listed points at least this share must be in the scan; else the topic is of another scan or in other axes.
+/// Smallest fraction of the listed points that must be in the scan; otherwise the list belongs to another scan or has other axes.
 const LEAST_FOUND: f64 = 0.5;
 
-/// Where the topic's messages are.
+/// The positions of the topic's messages.
 #[derive(Debug)]
 pub(super) struct DynamicPoints {
     pub(super) topic: String,
-    /// Each message's place and its time on the frames' clock.
+    /// Each message's position in the bag, and its time on the frames' clock.
     pub(super) places: Vec<(MessageRef, f64)>,
 }
 
 /// Which points of a scan are listed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct MatchedPoints {
-    /// One a point of the scan.
+    /// One value per point of the scan.
     pub(super) moves: Vec<bool>,
-    /// Points of the topic's message.
+    /// Number of points in the topic's message.
     pub(super) points: usize,
-    /// Of these, how many the scan has.
+    /// How many of these are in the scan.
     pub(super) found: usize,
 }
 
 impl DynamicPoints {
-    /// The scan's points that the message nearest to it lists; `None` without a message near enough.
+    /// The scan's points that are listed in the message nearest in time; `None` without a message near enough.
     ///
     /// # Errors
-    /// As [`scan::points`].
+    /// Those of [`scan::points`].
     pub(super) fn of(
         &self,
         bag: &dyn MessageSource,
@@ -55,7 +55,7 @@ impl DynamicPoints {
 }
 
 impl MatchedPoints {
-    /// Looks for each listed point among the scan's. Both in the LiDAR's axes, metres.
+    /// Finds each listed point among the scan's points. Both are in the LiDAR's axes, metres.
     fn find(xyz: &[[f32; 3]], listed: &[[f32; 3]]) -> Self {
         let mut by_x: Vec<usize> = (0..xyz.len()).filter(|i| usable(&xyz[*i])).collect();
         by_x.sort_by(|a, b| xyz[*a][0].total_cmp(&xyz[*b][0]));
@@ -80,7 +80,7 @@ impl MatchedPoints {
         found
     }
 
-    /// Whether the topic is about this scan: an empty list says that nothing moves.
+    /// Whether the list belongs to this scan. An empty list does: nothing moves.
     pub(super) fn is_of_scan(&self) -> bool {
         self.found as f64 >= LEAST_FOUND * self.points as f64
     }

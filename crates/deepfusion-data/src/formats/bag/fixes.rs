@@ -1,35 +1,35 @@
-//! The vehicle's speed by a satellite receiver's positions (NavSatFix).
+//! The vehicle's speed from a GPS receiver's positions (NavSatFix).
 
 use crate::logs::samples::Samples;
 use crate::{DataWarning, MotionWarning};
 use deepfusion_motion::{Fix, course_rates, speeds_of_fixes};
 use deepfusion_rosbag::msg::NavSatFix;
 
-/// A receiver that has no position says so by a status below this.
+/// A status below this means that the receiver has no position.
 const HAS_FIX: i8 = 0;
 
 /// Positions in the order of their messages.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Fixes {
-    /// Nanoseconds; degrees to the north and to the east.
+    /// Times in nanoseconds, with latitude and longitude in degrees.
     places: Vec<(i64, [f64; 2])>,
-    /// Messages of a receiver that had no position.
+    /// Number of messages without a position.
     without: usize,
 }
 
-/// What positions say of how the vehicle moved. Times are nanoseconds.
+/// The vehicle's motion computed from positions. Times are nanoseconds.
 #[derive(Debug, Default)]
 pub(super) struct SpeedsOfFixes {
-    /// Over ground, with those between that a slow receiver leaves out.
+    /// Speeds over ground, including interpolated ones between a slow receiver's positions.
     pub(super) speeds_mps: Vec<(i64, f64)>,
     /// Standard deviations of the speeds at the positions.
     pub(super) sigmas_mps: Option<Samples>,
-    /// How the course turned, positive to the left, where the vehicle moved.
+    /// Rate of turn of the course, positive to the left, while the vehicle moved.
     pub(super) course_rates_radps: Option<Samples>,
 }
 
 impl Fixes {
-    /// Takes a message in.
+    /// Adds a message.
     pub(super) fn add(&mut self, at_ns: i64, fix: &NavSatFix) {
         let place = [fix.latitude, fix.longitude];
         if fix.status.status < HAS_FIX || !place.iter().all(|x| x.is_finite()) {
@@ -44,12 +44,12 @@ impl Fixes {
         self.places.is_empty() && self.without == 0
     }
 
-    /// When they were measured, in nanoseconds.
+    /// Times of measurement, in nanoseconds.
     pub(super) fn times(&self) -> impl Iterator<Item = i64> {
         self.places.iter().map(|(ns, _)| *ns)
     }
 
-    /// Speeds of all positions together: gaps of up to `max_gap_s` are bridged, or of a few seconds. How that was done goes to the
+    /// Speeds from all positions. Gaps of up to `max_gap_s`, or a few seconds if it is not set, are bridged, with a note in the
     /// warnings.
     pub(super) fn speeds(
         &mut self,
@@ -135,7 +135,7 @@ mod tests {
     fn what_is_no_position_is_left_out_and_gaps_are_bridged() {
         let mut fixes = Fixes::default();
         for second in 0..20_i64 {
-            // 10 m/s; while the receiver has no position it says the origin's, and once there is a number missing.
+            // 10 m/s; without a position the receiver gives the origin, and once a number is missing.
             let (metres, status) = match second {
                 7 => (0.0, -1),
                 8 => (f64::NAN, 0),
@@ -145,7 +145,7 @@ mod tests {
         }
         let mut warnings = Vec::new();
         let found = fixes.speeds("/fix", None, &mut warnings);
-        // Those of the positions alone, which are 18.
+        // Only those of the 18 positions.
         let sigmas = found.sigmas_mps.unwrap();
         assert_eq!(sigmas.ns.len(), 18);
         assert!(sigmas.values.iter().all(|sigma| (0.1..3.0).contains(sigma)));
@@ -161,18 +161,18 @@ mod tests {
         let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         let warnings = warnings.join("\n");
         for said in [
-            "left out, as they have no position: 2 of 20 messages",
-            "sure to 0.",
+            "2 of 20 messages left out for lack of a position",
+            "median standard deviation 0.",
             "vehicle.max_gap_s",
             "up to 3.0 s",
         ] {
             assert!(warnings.contains(said), "{said}: {warnings}");
         }
-        // Not across more than is allowed.
+        // Not across longer gaps than allowed.
         let speeds = fixes.speeds("/fix", Some(2.0), &mut Vec::new()).speeds_mps;
         let steps = speeds.windows(2).map(|w| w[1].0 - w[0].0);
         assert_eq!(steps.max(), Some(3_000_000_000));
-        // One position alone is no speed, and none at all is none.
+        // Neither a single position nor none gives a speed.
         let mut lone = Fixes::default();
         lone.add(0, &fix(0.0, 0));
         let mut warnings = Vec::new();

@@ -1,36 +1,36 @@
-//! Frames within frames, as `/tf_static` and `/tf` have them, and the way from one to another.
+//! The frames of `/tf_static` and `/tf`, and the transforms between any two of them.
 
 use deepfusion_geometry::Se3;
 use deepfusion_rosbag::msg::TransformStamped;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
-/// Two transforms are the same if they differ by no more: metres, and radians (half a degree). Drivers publish calibrations with
+/// Two transforms count as equal up to these differences: metres, and radians (half a degree). Drivers publish calibrations with
 /// few digits.
 const SAME_M: f64 = 0.01;
 const SAME_RAD: f64 = 0.0087;
-/// So many ways between two frames are looked at; one tells a tree, a second one that it is none.
+/// Most paths between two frames that are compared.
 const MOST_WAYS: usize = 16;
 
 /// All transforms of a bag.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Frames {
-    /// By parent and child.
+    /// Links by parent and child.
     links: BTreeMap<(String, String), Link>,
-    /// Transforms that are none: without a rotation, or with NaN.
+    /// Number of invalid transforms, without a rotation or with NaN.
     pub(super) broken: usize,
 }
 
-/// Where a frame is in its parent, over the bag.
+/// A frame's transform to its parent, over the whole bag.
 #[derive(Debug, Clone, Copy)]
 struct Link {
-    /// Of the first message.
+    /// Transform in the first message.
     parent_from_child: Se3,
-    /// How far later ones are from it.
+    /// Largest difference of later transforms from it.
     change: Change,
 }
 
-/// How far two transforms are apart.
+/// Difference between two transforms.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Change {
     pub(crate) metres: f64,
@@ -38,7 +38,7 @@ pub(crate) struct Change {
 }
 
 impl Change {
-    /// Between two ways from one frame to another.
+    /// The difference between two transforms.
     pub(super) fn between(a: &Se3, b: &Se3) -> Self {
         Self {
             metres: (a.translation() - b.translation()).norm(),
@@ -46,7 +46,7 @@ impl Change {
         }
     }
 
-    /// Whether it is none to speak of.
+    /// Whether it is negligible.
     pub(super) fn is_small(self) -> bool {
         self.metres <= SAME_M && self.radians <= SAME_RAD
     }
@@ -66,10 +66,10 @@ impl std::fmt::Display for Change {
     }
 }
 
-/// A way from one frame to another.
+/// A chain of frames from one to another.
 #[derive(Debug, Clone)]
 pub(super) struct Chain {
-    /// From the source's frame to the target's.
+    /// Names of the frames, from the source to the target.
     pub(super) names: Vec<String>,
     pub(super) target_from_source: Se3,
 }
@@ -80,21 +80,21 @@ impl std::fmt::Display for Chain {
     }
 }
 
-/// What the frames say of where one is in another.
+/// Result of looking up the transform between two frames.
 #[derive(Debug, Clone)]
 pub(super) enum Lookup {
-    /// It stays there.
+    /// The transform is constant.
     Fixed(Chain),
-    /// Two chains that say different things.
+    /// Two chains contradict each other.
     Several(Box<[Chain; 2]>),
-    /// It moves: the link of the chain that does, and by how much.
+    /// The transform changes: the link of the chain that does, and by how much.
     Moves([String; 2], Change),
-    /// Nothing.
+    /// No chain connects the frames.
     Unknown,
 }
 
 impl Frames {
-    /// Takes a transform in.
+    /// Adds a transform.
     pub(super) fn add(&mut self, transform: &TransformStamped) {
         let (t, q) = (
             transform.transform.translation,
@@ -118,18 +118,18 @@ impl Frames {
         link.change = link.change.or_larger(change);
     }
 
-    /// Whether there are any.
+    /// Whether there are no frames.
     pub(super) fn is_empty(&self) -> bool {
         self.links.is_empty()
     }
 
-    /// Whether a frame is one of them.
+    /// Whether there is a frame with this name.
     pub(super) fn has(&self, name: &str) -> bool {
         let name = plain(name);
         self.links.keys().any(|(p, c)| p == name || c == name)
     }
 
-    /// All of them, in the order of their names.
+    /// All names, sorted.
     pub(super) fn names(&self) -> Vec<&str> {
         let ends = self.links.keys().flat_map(|(p, c)| [p.as_str(), c]);
         let mut names: Vec<&str> = ends.collect();
@@ -138,7 +138,7 @@ impl Frames {
         names
     }
 
-    /// Where the source's frame is in the target's.
+    /// The transform from the source's frame to the target's.
     pub(super) fn lookup(&self, target: &str, source: &str) -> Lookup {
         let (target, source) = (plain(target), plain(source));
         if !(self.has(target) && self.has(source)) {
@@ -169,7 +169,7 @@ impl Frames {
         })
     }
 
-    /// The link between two frames, whichever is the parent.
+    /// The link between two frames, in either direction.
     fn link(&self, a: &str, b: &str) -> Option<&Link> {
         let key = |p: &str, c: &str| (p.to_owned(), c.to_owned());
         self.links
@@ -177,9 +177,9 @@ impl Frames {
             .or_else(|| self.links.get(&key(b, a)))
     }
 
-    /// The ways without a frame twice, over links that stay as they are or over any.
+    /// The chains without repeated frames, over constant links only or over all links.
     fn ways(&self, target: &str, source: &str, only_fixed: bool) -> Vec<Chain> {
-        // Depth first; a tree has one way, so that every frame is seen once.
+        // Depth first. In a tree there is one chain, so every frame is visited once.
         let mut open = vec![Chain {
             names: vec![source.to_owned()],
             target_from_source: Se3::identity(),
@@ -195,7 +195,7 @@ impl Frames {
                 }
                 continue;
             }
-            // Hundreds of frames with many loops have more ways than there is time for.
+            // Hundreds of frames with many loops have too many chains to list.
             if steps > 100_000 {
                 break;
             }
@@ -224,7 +224,7 @@ impl Frames {
     }
 }
 
-/// A frame's name: before tf2 some had a slash in front.
+/// A frame's name without the leading slash that some had before tf2.
 pub(super) fn plain(name: &str) -> &str {
     name.strip_prefix('/').unwrap_or(name)
 }
@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(chain.to_string(), "camera → mast → base");
         let place = chain.target_from_source.translation();
         assert!((place - Vector3::new(1.0, 2.0, 0.0)).norm() < 1e-12);
-        // The LiDAR in the camera's axes: 4 m ahead of the base's x = 1, the camera looks to the left.
+        // The LiDAR in the camera's axes: it is 4 m ahead of the mast at x = 1, and the camera looks to the left.
         let place = fixed(tree.lookup("camera", "lidar"))
             .target_from_source
             .translation();

@@ -1,4 +1,4 @@
-//! An image message as pixels.
+//! Decodes image messages.
 
 use super::index::MessageRef;
 use crate::{Error, ImageProblem, Result};
@@ -8,10 +8,10 @@ use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
 use image::{DynamicImage, RgbImage};
 use std::borrow::Cow;
 
-/// The message of a topic recorded at a place's time.
+/// The topic's message that was recorded at the time of `place`.
 ///
 /// # Errors
-/// [`Error::Bag`]; [`Error::Image`] where it is no longer there.
+/// [`Error::Bag`]; [`Error::Image`] if it no longer exists.
 pub(super) fn message<'bag>(
     bag: &'bag dyn MessageSource,
     topic: &str,
@@ -22,7 +22,7 @@ pub(super) fn message<'bag>(
     let mut last = None;
     for message in bag.messages_on_demand(selection)? {
         let message = message?;
-        // Two messages can be recorded in one nanosecond: the stamp tells them apart.
+        // Two messages can be recorded in the same nanosecond; their stamps differ.
         if super::index::stamp(&message) == place.stamp_ns {
             return Ok(message);
         }
@@ -40,7 +40,7 @@ pub(super) fn message<'bag>(
 /// The pixels of an image message as 8-bit RGB.
 ///
 /// # Errors
-/// [`Error::Bag`] for an encoding that is no picture, or sizes that contradict each other; [`Error::Image`].
+/// [`Error::Bag`] for an unsupported encoding, or sizes that contradict each other; [`Error::Image`].
 pub(super) fn decode(bag: &dyn MessageSource, message: &Message<'_>) -> Result<RgbImage> {
     if message.is::<CompressedImage<'_>>() {
         let compressed: CompressedImage<'_> = message.decode()?;
@@ -66,8 +66,8 @@ pub(super) fn decode(bag: &dyn MessageSource, message: &Message<'_>) -> Result<R
     rgb(bag, message, &image)
 }
 
-/// The Bayer pattern of a picture that was compressed as its sensor took it, a colour a pixel, by the message's format: ROS 1 writes
-/// `bayer_rggb8; jpeg compressed ` of it, and with `bgr8` behind where colours were made first.
+/// The Bayer pattern of an image that was compressed without demosaicing, according to the message's format: ROS 1 then writes
+/// `bayer_rggb8; jpeg compressed `, but with `bgr8` at the end if the image was demosaiced first.
 fn mosaic(format: &str) -> Option<String> {
     let (encoding, rest) = format.split_once(';')?;
     let (_, compressed_as) = rest.split_once("compressed")?;
@@ -76,9 +76,9 @@ fn mosaic(format: &str) -> Option<String> {
     (is_bayer && compressed_as.trim().is_empty()).then(|| encoding.to_owned())
 }
 
-/// The pixels of an image that `message` holds.
+/// The RGB pixels of an image from `message`.
 fn rgb(bag: &dyn MessageSource, message: &Message<'_>, image: &Image<'_>) -> Result<RgbImage> {
-    // As a message of the bag's, whose hint says what is read: an image file's would say PNG and JPEG.
+    // Report errors as those of a message, whose hint lists the supported encodings; an image file's hint would list PNG and JPEG.
     let pixels = image
         .to_rgb8()
         .map_err(|source| deepfusion_rosbag::Error::Message {
@@ -105,7 +105,7 @@ mod tests {
     use deepfusion_rosbag::{Bag, BagWriter, WriterOptions};
     use std::io::Cursor;
 
-    /// The picture of a bag with one message.
+    /// The decoded image of a bag with one message.
     fn decoded<'m, M: RosMessage<'m>>(image: &M) -> Result<RgbImage> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("one.bag");
@@ -119,7 +119,7 @@ mod tests {
         decode(&bag, &messages.next().unwrap().unwrap())
     }
 
-    /// The picture of one image of 2 × 2 pixels.
+    /// The decoded image of a message with 2 × 2 pixels.
     fn picture(encoding: &str) -> Result<RgbImage> {
         decoded(&Image {
             header: Header::default(),
@@ -132,7 +132,7 @@ mod tests {
         })
     }
 
-    /// A mosaic of one colour, as a grey picture of 4 × 4 pixels.
+    /// A Bayer mosaic of a uniform colour, stored as a grey image of 4 × 4 pixels.
     fn of_format(format: &str) -> RgbImage {
         let filter = [[200, 90], [90, 7]];
         let grey = image::GrayImage::from_fn(4, 4, |x, y| {
@@ -154,7 +154,7 @@ mod tests {
         let colour = [200_u8, 90, 7].repeat(16);
         assert_eq!(of_format("bayer_rggb8; jpeg compressed ").as_raw(), &colour);
         assert_eq!(of_format("bayer_rggb8; png compressed").as_raw(), &colour);
-        // Grey pictures, whatever the camera had before.
+        // Grey images, whatever the camera's original encoding.
         for format in [
             "jpeg",
             "mono8; jpeg compressed ",

@@ -1,4 +1,4 @@
-//! One pass over a bag: when images and scans were taken, and what the vehicle said meanwhile.
+//! One pass over a bag: the times of images and scans, and the vehicle's measurements.
 
 use super::can::Can;
 use super::config::BagConfig;
@@ -21,16 +21,16 @@ use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A message that is read again when it is asked for.
+/// The position of a message that is read again on request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MessageRef {
-    /// When it was recorded, by which it is found again.
+    /// Time of recording, by which it is found again.
     pub(super) recorded: Time,
-    /// When it was measured, by the sensor's clock, nanoseconds since 1970.
+    /// Time of measurement on the sensor's clock, nanoseconds since 1970.
     pub(super) stamp_ns: i64,
 }
 
-/// The message nearest to a time, no farther than `within_s`; `places` by time.
+/// The message nearest to a time, at most `within_s` away; `places` are ordered by time.
 pub(super) fn nearest(
     places: &[(MessageRef, f64)],
     time_s: f64,
@@ -43,71 +43,71 @@ pub(super) fn nearest(
     nearest.filter(|p| apart(p) <= within_s)
 }
 
-/// What one pass finds. Times of the vehicle's streams are nanoseconds.
+/// Everything found in one pass. Times of the vehicle's streams are nanoseconds.
 #[derive(Debug, Default)]
 pub(super) struct Index {
     pub(super) images: Vec<MessageRef>,
-    /// Of a camera whose messages are a video stream's.
+    /// Packets of a camera whose messages are a video stream.
     pub(super) video: Option<VideoTopic>,
     pub(super) scans: Vec<MessageRef>,
-    /// Messages of the points that move.
+    /// Messages with the dynamic points.
     pub(super) dynamic: Vec<MessageRef>,
     pub(super) camera_info: Option<CameraInfo>,
-    /// Of a message each; of satellite positions what [`Fixes::speeds`] makes of them.
+    /// One speed per message, or the speeds that [`Fixes::speeds`] computes from GPS positions.
     pub(super) speed_mps: Vec<(i64, f64)>,
-    /// Of a twist each: the velocity across that of `speed_mps`.
+    /// One lateral velocity per twist, for the entries of `speed_mps`.
     across_mps: Vec<f64>,
-    /// Of an odometry's messages, each without a twist: `world_from_body`.
+    /// One `world_from_body` per odometry message without a twist.
     poses: Vec<(i64, Se3)>,
-    /// Satellite positions, where they are the speed's source.
+    /// GPS positions, if they are the source of the speed.
     pub(super) fixes: Fixes,
-    /// How sure the speeds of positions are.
+    /// Standard deviations of the speeds from positions.
     pub(super) sigmas_mps: Option<Samples>,
-    /// How the course of positions turned.
+    /// Rates of turn of the course from positions.
     pub(super) course_rates_radps: Option<Samples>,
-    /// Of the message that holds the speed, rad/s; not every publisher fills it.
+    /// Yaw rates in the messages with the speed, rad/s; not every publisher fills them in.
     pub(super) yaw_rate: Vec<(i64, f64)>,
-    /// Roll and pitch rate, in rad/s, where a twist gives all three.
+    /// Roll and pitch rate, in rad/s, if a twist has all three rates.
     pub(super) tilt_rates: Vec<(i64, [f64; 2])>,
-    /// Roll and pitch, in radians, where the speeds are those of poses.
+    /// Roll and pitch, in radians, if the speeds are computed from poses.
     pub(super) tilts_rad: Vec<(i64, [f64; 2])>,
     pub(super) steering_rad: Vec<(i64, f64)>,
     pub(super) imu: Vec<(i64, ImuSample)>,
-    /// Whether a message of the inertial unit says that its rates are none.
+    /// Whether a message of the inertial unit marks its rates as missing.
     rates_denied: bool,
     /// `world_from_vehicle`, exact.
     pub(super) truth: Vec<(i64, Se3)>,
-    /// Where frames are in each other.
+    /// The transforms between frames.
     pub(super) frames: Frames,
-    /// The frame of the images, by the first that has one, as of the others.
+    /// The frame of the images, from the first message that names one; likewise for the other sensors.
     pub(super) image_frame: Option<String>,
     pub(super) camera_info_frame: Option<String>,
     pub(super) lidar_frame: Option<String>,
     pub(super) imu_frame: Option<String>,
-    /// The frame whose speed it is.
+    /// The frame that the speed refers to.
     pub(super) speed_frame: Option<String>,
-    /// Chunks or messages that could not be read, in sentences.
+    /// Errors about chunks or messages that could not be read, as text.
     pub(super) lost: Vec<String>,
-    /// CAN signals that no frame holds.
+    /// Warnings about CAN signals without any value.
     pub(super) silent: Vec<DataWarning>,
-    /// How speeds were computed.
+    /// Warnings about how speeds were computed.
     pub(super) computed: Vec<DataWarning>,
-    /// Messages whose header has no time, by topic: the time of recording stands for it.
+    /// Number of messages without a time in their header, by topic; their time of recording is used instead.
     pub(super) unstamped: BTreeMap<String, usize>,
 }
 
 impl Index {
-    /// Whether the messages that hold the speed ever say a turn: publishers that know none write zeros, or NaN. Poses always say it.
+    /// Whether the messages with the speed have a yaw rate. Publishers without one write zeros or NaN. Poses always give one.
     pub(super) fn says_turns(&self) -> bool {
         let turns = |rate: f64| rate.is_finite() && rate != 0.0;
         !self.tilts_rad.is_empty() || self.yaw_rate.iter().any(|(_, rate)| turns(*rate))
     }
 
-    /// Reads the topics' stamps and the vehicle's values. Images and clouds are not decoded. What cannot be read is
-    /// counted and left out: a bag with a broken chunk has whole ones too.
+    /// Reads the topics' stamps and the vehicle's values. Images and clouds are not decoded. Unreadable parts are
+    /// counted and left out, since other chunks of the bag can still be used.
     ///
     /// # Errors
-    /// [`Error::Bag`] where reading cannot begin; [`Error::Config`] for units or signals that are missing.
+    /// [`Error::Bag`] if reading cannot begin; [`Error::Config`] for missing units or signals.
     pub(super) fn read(
         bag: &dyn MessageSource,
         topics: &Topics,
@@ -137,7 +137,7 @@ impl Index {
         index.take_lengths(topics);
         index.leave_out_rateless(topics);
         let beyond = can.keep_measured(&mut index.speed_mps, &mut index.steering_rad);
-        // The one place where the vehicle's speeds are scaled, whichever message held them.
+        // The only place where the vehicle's speeds are scaled, for all types of messages.
         let scale = config.vehicle.speed_scale.unwrap_or(1.0);
         index.speed_mps.iter_mut().for_each(|(_, v)| *v *= scale);
         if let Some(sigmas) = &mut index.sigmas_mps {
@@ -165,8 +165,8 @@ impl Index {
         Ok(index)
     }
 
-    /// An odometry of which every message leaves its twist at 0 says by its poses how the vehicle moves. Where these are of a body with
-    /// other axes nothing is known of the speed: the zeros would be a vehicle that stands.
+    /// Computes speed and turns from the poses of an odometry whose twists are all 0. If the poses are of a body with other axes,
+    /// the speed is unknown: the zeros would mean a vehicle that stands still.
     fn take_poses(&mut self, bag: &Path, topics: &Topics) {
         let poses = std::mem::take(&mut self.poses);
         if poses.is_empty() || poses.len() != self.speed_mps.len() {
@@ -197,7 +197,7 @@ impl Index {
         self.computed.push(warning.into());
     }
 
-    /// Of velocities along the world's axes their length is the speed. Which way the vehicle's front looked they do not say.
+    /// Uses the length of velocities in world axes as speed, since they do not show the vehicle's heading.
     fn take_lengths(&mut self, topics: &Topics) {
         let across = std::mem::take(&mut self.across_mps);
         let ahead = self.speed_mps.iter().map(|(_, ahead)| *ahead);
@@ -214,8 +214,8 @@ impl Index {
             .push(MotionWarning::WorldAxes { topic }.into());
     }
 
-    /// An inertial unit that measures no rates is none here: its zeros are no straight drive, nor is any rate that never changes and is said not to be
-    /// there. Some drivers publish a gyroscope and an accelerometer as a topic each, others fill in the accelerations alone.
+    /// Leaves out an inertial unit without angular rates: its zeros do not mean a straight drive, nor does a constant rate that is marked
+    /// as missing. Some drivers publish gyroscope and accelerometer as separate topics, others only fill in the accelerations.
     fn leave_out_rateless(&mut self, topics: &Topics) {
         let Some(topic) = topics.of(TopicRole::Imu) else {
             return;
@@ -292,7 +292,7 @@ impl Index {
                 TopicRole::CameraInfo => {}
                 TopicRole::Imu => {
                     let imu: Imu = message.decode()?;
-                    // By the message's definition there are no angular rates then; some drivers say so of rates that are there.
+                    // By the message's definition, there are no angular rates then; but some drivers write this with valid rates.
                     self.rates_denied |= imu.angular_velocity_covariance[0] == -1.0;
                     let (a, w) = (imu.linear_acceleration, imu.angular_velocity);
                     let sample = ImuSample {
@@ -358,14 +358,14 @@ fn pairs(samples: Samples) -> Vec<(i64, f64)> {
     samples.ns.into_iter().zip(samples.values).collect()
 }
 
-/// When a message was measured, in nanoseconds: the stamp of its header; the time of recording where it has no header, or
-/// one that is not set. Taken as they are, unset stamps would put all messages of a topic at one instant.
+/// A message's time of measurement, in nanoseconds: the stamp in its header, or the time of recording if it has no header or
+/// the stamp is not set. Unset stamps would put all messages of a topic at the same time.
 pub(super) fn stamp(message: &Message<'_>) -> i64 {
     let stamp = has_header(message).then(|| message.header_stamp());
     nanos(stamp.flatten().unwrap_or(message.time()))
 }
 
-/// Whether a message of a type that is read here begins with a header: all but bare numbers and lists of frames do.
+/// Whether a message of a type that is read here begins with a header: all do except plain numbers and lists of transforms.
 fn has_header(message: &Message<'_>) -> bool {
     let frames = message.is::<TFMessage>() || message.is::<OldTFMessage>();
     !frames && !message.is::<Float32>() && !message.is::<Float64>()

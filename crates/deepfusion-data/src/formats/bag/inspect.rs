@@ -1,4 +1,4 @@
-//! What is in a bag that no camera wrote into.
+//! Inspects a bag without images.
 
 use super::config::BagConfig;
 use super::index::Index;
@@ -11,13 +11,13 @@ use deepfusion_geometry::Se3;
 use deepfusion_motion::Signal;
 use std::path::Path;
 
-/// Speeds farther apart than this are not joined, in seconds.
+/// Longest gap between speeds that is bridged, in seconds.
 const MAX_GAP_S: f64 = 0.5;
 
-/// The streams of a bag without images; `None` where it has some.
+/// The streams of a bag without images; `None` if it has images.
 ///
 /// # Errors
-/// As [`crate::Dataset::open`].
+/// Those of [`crate::Dataset::open`].
 pub(crate) fn without_images(path: &Path, options: &OpenOptions) -> Result<Option<Inspection>> {
     let config = BagConfig::of(path, options)?;
     let bag = source::open(path)?;
@@ -28,7 +28,7 @@ pub(crate) fn without_images(path: &Path, options: &OpenOptions) -> Result<Optio
     let index = Index::read(bag.as_ref(), &topics, &config)?;
     let mut warnings = damage_of(bag.as_ref(), &index);
     warnings.extend(oddities_of(&topics, &index));
-    // Of the mounts only the inertial unit's counts here; what is wrong with the others ends an opening, and no look at it.
+    // Only the inertial unit's mount is needed here. Errors in the others prevent opening the bag, but not inspecting it.
     let mounts = Mounts::find(path, &config, &index, &mut Vec::new()).ok();
     let imu = mounts.and_then(|mounts| mounts.vehicle_from_imu);
     let mut speeds = index.speed_mps.clone();
@@ -50,7 +50,7 @@ pub(crate) fn without_images(path: &Path, options: &OpenOptions) -> Result<Optio
         frames: 0,
         missing_frames: Vec::new(),
         usable_pairs: 0,
-        why_no_pairs: Some("none of the bag's topics holds images".into()),
+        why_no_pairs: Some("none of the bag's topics has images".into()),
         scans: 0,
         speed_mps,
         distance_m,
@@ -75,8 +75,8 @@ pub(crate) fn without_images(path: &Path, options: &OpenOptions) -> Result<Optio
     }))
 }
 
-/// How far the vehicle turned, in radians, positive to the left: by all its sensors where it has a speed, else by the
-/// yaw rates as they were measured, bias included. `None` where there are none.
+/// The vehicle's total turn, in radians, positive to the left: from all its sensors if it has a speed, otherwise from the
+/// measured yaw rates, including their bias. `None` without either.
 fn turn(
     path: &Path,
     index: &Index,
@@ -84,7 +84,7 @@ fn turn(
     vehicle_from_imu: Option<&Se3>,
 ) -> Option<f64> {
     let origin_ns = index.speed_mps.iter().map(|s| s.0).min();
-    // Sensors that contradict each other end an opening; here they still say what they measured.
+    // Contradicting sensors prevent opening the bag, but here their measurements are still reported.
     let motion = |ns| sensors::motion(path, index, config, vehicle_from_imu, ns);
     let motion = origin_ns.and_then(|ns| motion(ns).ok().flatten());
     if let Some(motion) = motion.filter(|m| m.yaw_known) {
@@ -101,8 +101,8 @@ fn turn(
     total(pairs.filter_map(|t| signal.integral(t[0], t[1])))
 }
 
-/// Yaw rates in rad/s by whoever measures them: the speed's messages if they ever say a turn (not every publisher
-/// fills it), else the inertial unit, whose z is up unless the file beside the bag, or its frames, turn it.
+/// Yaw rates in rad/s, from the speed's messages if they have any (not every publisher fills them in), otherwise from the
+/// inertial unit, whose z is up unless the file beside the bag, or its frames, rotate it.
 fn yaw_rates(index: &Index, vehicle_from_imu: Option<&Se3>) -> Vec<(i64, f64)> {
     if index.says_turns() {
         return index.yaw_rate.clone();
@@ -115,7 +115,7 @@ fn yaw_rates(index: &Index, vehicle_from_imu: Option<&Se3>) -> Vec<(i64, f64)> {
     rates.collect()
 }
 
-/// The sum; `None` of nothing.
+/// The sum; `None` without values.
 fn total(parts: impl Iterator<Item = f64>) -> Option<f64> {
     parts.reduce(|sum, part| sum + part)
 }

@@ -1,11 +1,15 @@
 //! ROS bags with a camera and a vehicle's sensors, such as UMAD's.
 //!
-//! The way of a bag: `source` → `topics` → `sensors` and `index` → `open`. `source` is its reader, whatever is a
-//! [`deepfusion_rosbag::MessageSource`]. `topics` says which is which, by message type; `sensors` makes speed, steering and IMU a motion;
-//! `index` says when images and scans were taken, and by its messages' `readings` what the vehicle said. `open` puts these together with
-//! the `camera` to a `recording` (a [`crate::Recording`]). That reads an `image`, of a `video` stream a frame, or of its `scans` a `scan`,
-//! when it is asked for, with the points that its `dynamic` topic lists. Where the sensors are its `frames` say, as `mounts`. What a bag cannot say stands in a file beside it: `config`, which
-//! `write_config` writes.
+//! How a bag is opened: `source` → `topics` → `index` → `sensors` → `open`.
+//!
+//! - `source` opens its reader, a [`deepfusion_rosbag::MessageSource`].
+//! - `topics` assigns topics to roles, by message type.
+//! - `index` collects the times of images and scans, and the vehicle's measurements from its messages (`readings`).
+//! - `sensors` computes the motion from speed, steering and IMU.
+//! - `mounts` locates the sensors, with the transforms in `frames`.
+//! - `open` combines these with the `camera` into a `recording` (a [`crate::Recording`]), which reads an `image`, a frame of a `video`
+//!   stream, or one of its `scans` on request; a `scan` comes with the points listed by the `dynamic` topic.
+//! - `config` is the file beside a bag, for what the bag does not contain; `write_config` writes it.
 
 mod camera;
 mod can;

@@ -1,5 +1,5 @@
-//! Where camera, LiDAR and inertial unit are: by the file beside the bag, else by the frames of `/tf_static` and `/tf`, else by
-//! the profile.
+//! The mounts of camera, LiDAR and inertial unit: from the file beside the bag, otherwise from the frames of `/tf_static` and `/tf`,
+//! otherwise from the profile.
 
 use super::config::BagConfig;
 use super::frames::{Chain, Change, Lookup};
@@ -11,37 +11,37 @@ use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 use std::path::Path;
 
-/// Names of the vehicle's frame, the likelier to be at the rear axle first; the last part of a name counts. REP 105 lets
-/// `base_link` lie anywhere on the base; vehicles' stacks put it below the middle of the rear axle.
+/// Names of the vehicle's frame, starting with those most likely at the rear axle; only the last part of a name is compared. REP 105
+/// allows `base_link` anywhere on the base, but software for vehicles puts it below the middle of the rear axle.
 const VEHICLES: [&[&str]; 4] = [
     &["rear_axle", "rear_axle_link", "rear_axis_middle"],
     &["base_link"],
     &["base_footprint"],
     &["vehicle", "ego_vehicle", "ego", "car"],
 ];
-/// From this component of "up" along the z axis of an image's frame on, that axis does not look into the picture (REP 103: an
-/// optical frame's z does, its y looks down).
+/// If the component of "up" along the z axis of the images' frame is at least this, the frame is not an optical one (REP 103: an
+/// optical frame's z points into the scene, its y down).
 const BODY_AXES: f64 = 0.7;
 
-/// Where the sensors are.
+/// The sensors' mounts.
 #[derive(Debug)]
 pub(super) struct Mounts {
     pub(super) cam_from_vehicle: Se3,
-    /// Whether nothing says the above.
+    /// Whether `cam_from_vehicle` is only assumed.
     pub(super) camera_assumed: bool,
-    /// `None` where nothing says it.
+    /// `None` if unknown.
     pub(super) cam_from_lidar: Option<Se3>,
-    /// `None` where nothing says it.
+    /// `None` if unknown.
     pub(super) vehicle_from_imu: Option<Se3>,
-    /// Each that is known, and by whom.
+    /// All known mounts, with their sources.
     pub(super) said: Vec<Mount>,
 }
 
 impl Mounts {
-    /// The mounts of a bag; what is taken for granted, or contradicts another source, goes to the warnings.
+    /// The mounts of a bag. Assumptions and contradictions between sources are added to the warnings.
     ///
     /// # Errors
-    /// [`Error::Frames`] where the frames say two things of a mount that the file does not say.
+    /// [`Error::Frames`] if the frames contradict each other on a mount that is not in the file.
     pub(super) fn find(
         bag: &Path,
         config: &BagConfig,
@@ -102,10 +102,10 @@ impl Mounts {
     }
 }
 
-/// What begins the source of a mount that the frames say.
+/// Prefix of the source of a mount from the frames.
 const BY_FRAMES: &str = "frames ";
 
-/// Sources in their order, for one mount after the other.
+/// The sources of mounts, in order of precedence.
 struct Search<'a> {
     config: &'a BagConfig,
     warnings: &'a mut Vec<DataWarning>,
@@ -113,7 +113,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The bag's own file first, then the frames, then the profile.
+    /// One mount: from the bag's own file, otherwise from the frames, otherwise from the profile.
     fn one(
         &mut self,
         name: &'static str,
@@ -122,7 +122,7 @@ impl Search<'_> {
     ) -> Result<Option<Se3>> {
         let found = match by_frames() {
             Ok(found) => found,
-            // What the file says settles it.
+            // The file takes precedence, so errors in the frames do not matter.
             Err(_) if own.is_some() => MountByFrames::NotExpected,
             Err(error) => return Err(error),
         };
@@ -161,7 +161,7 @@ impl Search<'_> {
         Ok(Some(transform))
     }
 
-    /// Two sources that do not say the same: the first is taken.
+    /// Warns if two sources disagree; the first is used.
     fn compare(&mut self, mount: &'static str, taken: (&Se3, &str), other: (&Se3, &str)) {
         let change = Change::between(taken.0, other.0);
         if !change.is_small() {
@@ -180,13 +180,13 @@ impl Search<'_> {
     }
 }
 
-/// What the frames say of a mount.
+/// A mount according to the frames.
 enum MountByFrames {
-    /// It, and by which chain of frames.
+    /// The mount, and the chain of frames that gives it.
     Found(Se3, String),
-    /// Why nothing, where something could be expected.
+    /// Why the frames do not give the mount, although they should.
     Unknown(NotByFrames),
-    /// Nothing, and nothing was to be expected.
+    /// The frames do not give the mount, and need not.
     NotExpected,
 }
 
@@ -195,11 +195,11 @@ struct ByFrames<'a> {
     bag: &'a Path,
     config: &'a BagConfig,
     index: &'a Index,
-    /// The images' frame, where it is among the frames.
+    /// The images' frame, if it is among the frames.
     camera: Option<String>,
     lidar: Option<String>,
     imu: Option<String>,
-    /// Whether the images' frame has the axes of a body: x forward, y left, z up.
+    /// Whether the images' frame has body axes: x forward, y left, z up.
     body_axes: bool,
 }
 
@@ -275,7 +275,7 @@ impl<'a> ByFrames<'a> {
             let of_imu = &self.index.imu_frame;
             return Ok(self.absent(of_imu, "the inertial unit", "imu"));
         };
-        // One vehicle for all sensors.
+        // Use the same vehicle frame for all sensors.
         let anchor = self.camera.as_ref().unwrap_or(imu);
         match self.vehicle(anchor)? {
             Some(vehicle) => self.between("vehicle_from_imu", &vehicle, imu),
@@ -283,7 +283,7 @@ impl<'a> ByFrames<'a> {
         }
     }
 
-    /// A sensor's frame that no transform has.
+    /// The result for a sensor's frame that is in no transform.
     fn absent(
         &self,
         frame: &Option<String>,
@@ -293,7 +293,7 @@ impl<'a> ByFrames<'a> {
         if self.index.frames.is_empty() {
             return MountByFrames::NotExpected;
         }
-        // A sensor that was not recorded has no messages, and none is missed.
+        // A sensor that was not recorded has no messages, so no warning is needed.
         let Some(frame) = frame else {
             return MountByFrames::NotExpected;
         };
@@ -305,7 +305,7 @@ impl<'a> ByFrames<'a> {
         })
     }
 
-    /// The vehicle's frame: the one that the file names, else the likeliest that a sensor's frame is fixed to.
+    /// The vehicle's frame: the one named in the file, otherwise the likeliest one to which a sensor's frame is fixed.
     fn vehicle(&self, anchor: &str) -> Result<Option<String>> {
         if let Some(named) = &self.config.frames.vehicle {
             return Ok(Some(named.clone()));
@@ -343,7 +343,7 @@ impl<'a> ByFrames<'a> {
                         Some(_) => {}
                         None => found = Some((name, chain)),
                     },
-                    // Reported as what it is by the caller, who asks for this way again.
+                    // The caller looks up this transform again, and reports the contradiction.
                     Lookup::Several(_) => return Ok(Some(name.to_owned())),
                     Lookup::Moves(..) => moving = moving.or(Some(name)),
                     Lookup::Unknown => {}
@@ -356,7 +356,7 @@ impl<'a> ByFrames<'a> {
         Ok(moving.map(str::to_owned))
     }
 
-    /// Where the source's frame is in the target's.
+    /// The transform from the source's frame to the target's.
     fn between(&self, mount: &'static str, target: &str, source: &str) -> Result<MountByFrames> {
         Ok(match self.index.frames.lookup(target, source) {
             Lookup::Fixed(chain) => {
@@ -388,8 +388,8 @@ impl<'a> ByFrames<'a> {
         })
     }
 
-    /// Whether the images' frame is none of an optical kind: "up" is along its z. What is up, the vehicle's frame says, else
-    /// the LiDAR's.
+    /// Whether the images' frame is not an optical one, because "up" is along its z. The up direction is the vehicle frame's, otherwise
+    /// the LiDAR frame's.
     fn has_body_axes(&self) -> bool {
         let Some(camera) = &self.camera else {
             return false;
@@ -403,7 +403,7 @@ impl<'a> ByFrames<'a> {
         ups.next().is_some_and(|up| up.z > BODY_AXES)
     }
 
-    /// A transform into the images' frame as one into the camera's axes.
+    /// Turns a transform into the images' frame into one into the camera's optical axes.
     fn upright(&self, mount: MountByFrames) -> MountByFrames {
         match mount {
             MountByFrames::Found(body_from, source) if self.body_axes => {

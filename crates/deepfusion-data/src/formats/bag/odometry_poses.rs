@@ -1,4 +1,4 @@
-//! Poses of an Odometry whose publisher fills in no twist, as odometries of LiDARs and cameras do: speed and turns follow from them.
+//! Speed and turns from the poses of Odometry messages without a twist, as published by LiDAR and visual odometry.
 
 use crate::formats::shared::pose_track::speed_log;
 use crate::logs::speed_log::SpeedLog;
@@ -7,22 +7,22 @@ use deepfusion_rosbag::msg::{Odometry, Twist};
 use nalgebra::Vector3;
 use std::path::Path;
 
-/// A way on which a direction is seen, in metres; poses that stay within it stand.
+/// Distance over which a direction of travel is determined, in metres. If the poses never move this far, the vehicle stands still.
 const STEP_M: f64 = 1.0;
-/// Least mean cosine of the angle between the poses' x and the way: beyond 26° x is another axis than the vehicle's.
+/// Least mean cosine of the angle between the poses' x axis and the direction of travel: beyond 26°, x is not the vehicle's forward axis.
 const ALONG: f64 = 0.9;
 
-/// What poses say of how the vehicle moved.
+/// The vehicle's motion according to poses.
 pub(super) enum PoseMotion {
-    /// They stay where they are.
+    /// The vehicle stands still.
     Standing,
-    /// Their x does not point along the way: they are of a body with other axes.
+    /// The poses' x does not point along the direction of travel: they are of a body with other axes.
     OtherAxes,
     /// Speeds, turns, roll and pitch.
     Moving(Box<SpeedLog>),
 }
 
-/// The pose of a message (a point of the body in a world that does not move, metres), where its twist is left at 0.
+/// The pose in a message (`world_from_body`, metres), if its twist is 0.
 pub(super) fn pose_without_twist(odometry: &Odometry) -> Option<Se3> {
     let Twist { linear, angular } = &odometry.twist.twist;
     let twist = [
@@ -37,7 +37,7 @@ pub(super) fn pose_without_twist(odometry: &Odometry) -> Option<Se3> {
     empty.then(|| Se3::from_quaternion([q.w, q.x, q.y, q.z], place))
 }
 
-/// The motion that poses by their times (ns) say; what is no pose, such as one without an orientation, is left out.
+/// The motion computed from poses with their times (ns). Invalid poses, such as those without an orientation, are left out.
 pub(super) fn motion_of(bag: &Path, mut poses: Vec<(i64, Se3)>) -> PoseMotion {
     let is_pose = |pose: &Se3| {
         let (attitude, place) = (pose.quaternion(), pose.translation());
@@ -53,7 +53,7 @@ pub(super) fn motion_of(bag: &Path, mut poses: Vec<(i64, Se3)>) -> PoseMotion {
     }
 }
 
-/// How far the poses' x points along their way, forward or back: the mean cosine; `None` where they stand.
+/// Mean cosine of the angle between the poses' x axis and the direction of travel, forward or backward; `None` if they stand still.
 fn along(poses: &[(i64, Se3)]) -> Option<f64> {
     let mut from = poses.first()?.1;
     let (mut sum, mut steps) = (0.0, 0_u32);
@@ -63,7 +63,7 @@ fn along(poses: &[(i64, Se3)]) -> Option<f64> {
         if way_m < STEP_M {
             continue;
         }
-        // Halfway between both attitudes, as the chord of an arc lies.
+        // The chord of an arc has the direction halfway between both attitudes.
         let ahead = from.interpolate(pose, 0.5).rotate(&Vector3::x());
         sum += ahead.dot(&moved).abs() / way_m;
         steps += 1;
@@ -76,7 +76,7 @@ fn along(poses: &[(i64, Se3)]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// 10 m/s along a direction, a pose each tenth of a second, with an attitude that stays.
+    /// 10 m/s in one direction, a pose each tenth of a second, with a constant attitude.
     fn poses(direction: [f64; 3], turn: [f64; 3]) -> Vec<(i64, Se3)> {
         let at = |i: i32| {
             let place = Vector3::from(direction) * f64::from(i);
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn poses_that_go_along_their_x_are_a_drive() {
         let path = Path::new("drive.bag");
-        // To the north, the x axis with it; the last pose has no orientation.
+        // To the north, with the x axis pointing north; the last pose has no orientation.
         let mut north = poses([0.0, 1.0, 0.0], [0.0, 0.0, 1.57]);
         let zero = Se3::from_quaternion([0.0; 4], Vector3::zeros());
         north.push((3_000_000_000, zero));

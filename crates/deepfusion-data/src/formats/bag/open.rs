@@ -1,4 +1,4 @@
-//! From bags to data sets: topics, then one pass over them, then the camera, the vehicle's motion and the scans.
+//! Opens bags as data sets: topics, then one pass over them, then the camera, the vehicle's motion and the scans.
 
 use super::config::BagConfig;
 use super::dynamic::DynamicPoints;
@@ -23,10 +23,10 @@ use deepfusion_rosbag::MessageSource;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Opens bags, a data set each.
+/// Opens each bag as a data set.
 ///
 /// # Errors
-/// As [`Dataset::open`].
+/// Those of [`Dataset::open`].
 pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let (mut datasets, mut without_camera) = (Vec::<Dataset>::new(), Vec::new());
     let mut refused = None;
@@ -35,7 +35,7 @@ pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Resu
         match opened.and_then(|dataset| dataset.select(path, options)) {
             Ok(dataset) => datasets.push(dataset),
             Err(error @ Error::SplitSelectsNothing { .. }) => refused = Some(error),
-            // A recorder may give each computer of the vehicle its bag; the others can still be used.
+            // Each computer of the vehicle may have recorded its own bag, so the others may have images.
             Err(error @ Error::NoFrames { .. }) => {
                 without_camera.push(source::name(bag));
                 refused = refused.or(Some(error));
@@ -56,10 +56,10 @@ pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Resu
     }
 }
 
-/// A recording of messages as a data set, with what the file beside it says.
+/// Opens a recording of messages as a data set, with the settings of the file beside it.
 ///
 /// # Errors
-/// As [`Dataset::open`].
+/// Those of [`Dataset::open`].
 pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Result<Dataset> {
     let path = bag.path();
     let config = BagConfig::of(path, options)?;
@@ -165,7 +165,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         .with_simulated(simulated))
 }
 
-/// The first image, with which the data set's time begins.
+/// The first image, at which the data set's time begins.
 fn first_image(bag: &dyn MessageSource, index: &Index) -> Result<MessageRef> {
     if let Some(first) = index.images.first() {
         return Ok(*first);
@@ -191,7 +191,7 @@ fn first_image(bag: &dyn MessageSource, index: &Index) -> Result<MessageRef> {
     })
 }
 
-/// The data set's clock: the vehicle's, from the first image on. Camera and LiDAR have one of their own, ahead of it.
+/// The data set's clock: the vehicle's, counted from the first image. Camera and LiDAR have their own clock, which is ahead of it.
 struct Clock {
     origin_ns: i64,
     camera_ahead_s: f64,
@@ -217,7 +217,7 @@ impl Clock {
     }
 }
 
-/// Numbers leave out as many as frames are missing in a pause: what lies on either side of one are no neighbours.
+/// The frames. In a pause, as many numbers are left out as frames are missing, so that the frames on both sides are not neighbours.
 fn frames(
     path: &Path,
     drive: &str,
@@ -240,7 +240,7 @@ fn frames(
     (0..).zip(numbers).zip(times_s).map(frame).collect()
 }
 
-/// Where the vehicle was, exactly: a simulated drive knows it, on the vehicle's clock.
+/// The vehicle's exact poses in a simulated drive, on the vehicle's clock.
 fn truth(index: &Index, origin_ns: i64) -> Trajectory {
     let poses = index.truth.iter().map(|(ns, pose)| StampedPose {
         time_s: (ns - origin_ns) as f64 * 1e-9,

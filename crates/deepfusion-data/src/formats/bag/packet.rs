@@ -1,4 +1,4 @@
-//! The packets of a video stream among a bag's messages.
+//! Packets of a video stream in a bag's messages.
 
 use crate::{Error, IncompleteWarning, Result};
 use deepfusion_rosbag::msg::{
@@ -12,21 +12,21 @@ use std::path::Path;
 /// The message types of video streams.
 pub(super) const TYPES: [&str; 2] = [CompressedVideo::<'_>::TYPE, FfmpegPacket::<'_>::TYPE];
 
-/// What of a stream's messages the pass over the bag has seen.
+/// The stream's messages, as counted in the pass over the bag.
 #[derive(Debug, Clone)]
 pub(super) struct VideoTopic {
     pub(super) name: String,
     pub(super) codec: Codec,
-    /// How many messages came before the first key frame.
+    /// Number of messages before the first key frame.
     pub(super) before: u64,
-    /// How many came from there on.
+    /// Number of messages from there on.
     pub(super) count: usize,
-    /// Of each image, by time of measurement, which packet it is.
+    /// Packet number of each image, ordered by time of measurement.
     pub(super) order: Vec<u64>,
 }
 
 impl VideoTopic {
-    /// Takes a message in: whether it is a frame's.
+    /// Adds a message; returns whether it is a frame.
     pub(super) fn add(
         found: &mut Option<Self>,
         topic: &str,
@@ -47,7 +47,7 @@ impl VideoTopic {
         true
     }
 
-    /// What is left out.
+    /// The warning about messages that are left out.
     pub(super) fn warning(&self) -> Option<IncompleteWarning> {
         (self.before > 0).then(|| IncompleteWarning::BeforeKeyFrame {
             topic: self.name.clone(),
@@ -56,10 +56,10 @@ impl VideoTopic {
     }
 }
 
-/// The packet of a message, and its codec; `None` where it is a picture by itself.
+/// The packet in a message, and its codec; `None` if the message is a single image.
 ///
 /// # Errors
-/// [`Error::Bag`]; [`Error::Video`] for a codec that is not read.
+/// [`Error::Bag`]; [`Error::Video`] for an unsupported codec.
 pub(super) fn packet<'m>(
     bag: &Path,
     message: &'m Message<'_>,
@@ -89,7 +89,8 @@ pub(super) fn packet<'m>(
     }
 }
 
-/// Both layouts of a packet have one name; that of ROS 1's first version is recognised by its MD5, which ROS 2 has none of.
+/// Whether a packet has the layout of ROS 1's first version. Both layouts have the same name, so it is recognised by its MD5, which ROS 2
+/// does not have.
 fn is_old(message: &Message<'_>) -> bool {
     message.serialization() == Serialization::Ros1 && message.is::<OldFfmpegPacket<'_>>()
 }

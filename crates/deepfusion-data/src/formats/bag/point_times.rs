@@ -1,14 +1,14 @@
-//! When each point of a scan was measured, where the scan says it.
+//! Times of a scan's points, if the scan has them.
 
 use crate::logs::clock::{TimeUnit, seconds};
 use deepfusion_rosbag::msg::{Column, Datatype};
 
-/// Farther from its scan's time than this, in seconds, no point is.
+/// Largest time between a point and its scan, in seconds.
 const FARTHEST_S: f64 = 1.0;
 
-/// The points' times in seconds after the scan's own, which is `scan_ns` after 1970: of dates in any unit, and else of numbers that count
-/// from it, whole ones in nanoseconds, as Ouster's `t`, others in seconds, as Velodyne's `time`. What is no point by `is_point` has no time,
-/// whatever stands there. `None` where a point would be more than a second off.
+/// The points' times in seconds after the scan's own time, which is `scan_ns` after 1970. The numbers may be dates in any unit, or count
+/// from the scan's time: integers in nanoseconds, like Ouster's `t`, others in seconds, like Velodyne's `time`. Points that are invalid
+/// according to `is_point` have no time, whatever their number. `None` if a point is more than a second off.
 pub(super) fn seconds_after(
     column: &Column<'_>,
     scan_ns: i64,
@@ -25,7 +25,7 @@ pub(super) fn seconds_after(
     };
     let per_second = unit.per_second();
     let after = column.f64s().enumerate().map(|(i, number)| {
-        // Without a time of its own a point is of the scan's.
+        // A point without a time of its own has the scan's.
         if number.is_nan() || !is_point(i) {
             0.0
         } else {
@@ -45,7 +45,7 @@ mod tests {
 
     const SCAN_NS: i64 = 1_700_000_000_500_000_000;
 
-    /// Of a cloud whose only field has these bytes, and whose first numbers are of no points.
+    /// The times for a cloud whose only field has these bytes, and whose first numbers belong to invalid points.
     fn after(datatype: Datatype, numbers: &[Vec<u8>], no_points: usize) -> Option<Vec<f32>> {
         let size = datatype.size() as u32;
         let cloud = PointCloud2 {
@@ -88,7 +88,7 @@ mod tests {
         assert_eq!(of_f64([1_600_000_000.0, 1_600_000_000.1]), None);
     }
 
-    /// Many drivers fill them with zeros, beside dates as well.
+    /// Many drivers fill invalid points with zeros, even if the others have dates.
     #[test]
     fn rays_without_an_echo_need_no_times() {
         let numbers = [0.0, f64::INFINITY, 1_700_000_000.55, f64::NAN];

@@ -1,9 +1,9 @@
-//! What a data set's paper says of its vehicle, for bags that hold none of it. A profile is a file as the one beside a bag; it
-//! comes with the program.
+//! A data set's published calibration, for bags that do not contain it. A profile has the format of the file beside a bag, and is
+//! included in the program.
 
 use toml::{Table, Value};
 
-/// The profiles by their names. They name no files: there is no folder to look for those in.
+/// The profiles by name. They must not name files, since there is no folder to look for them in.
 const PROFILES: [(&str, &str); 1] = [(
     "umad",
     include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/profiles/umad.toml")),
@@ -12,25 +12,25 @@ const PROFILES: [(&str, &str); 1] = [(
 /// The keys of mounts.
 const MOUNTS: [&str; 3] = ["cam_from_lidar", "cam_from_vehicle", "vehicle_from_imu"];
 
-/// The names that `profile` may be.
+/// The known values of `profile`.
 pub(super) fn names() -> impl Iterator<Item = &'static str> {
     PROFILES.iter().map(|(name, _)| *name)
 }
 
-/// What a bag's file says, completed by a profile.
+/// A bag's file, completed by a profile.
 pub(super) struct Completed {
-    /// The whole table, but the profile's camera and mounts.
+    /// The completed table, without the profile's camera and mounts.
     pub(super) table: Table,
-    /// The profile's camera, which goes behind CameraInfo.
+    /// The profile's camera; CameraInfo takes precedence.
     pub(super) camera: Option<Value>,
-    /// Its mounts that the file does not have, which go behind the bag's frames.
+    /// The profile's mounts that the file does not have; the bag's frames take precedence.
     pub(super) mounts: Table,
 }
 
-/// The table of a bag's file, with what it leaves out as the profile of this name has it. `None` where there is no such profile.
+/// A bag's table, completed by the profile of this name; `None` if there is no such profile.
 ///
 /// # Errors
-/// What of the profile is no such file.
+/// If the profile is not valid TOML.
 pub(super) fn complete(own: Table, name: &str) -> Option<Result<Completed, toml::de::Error>> {
     let (_, text) = PROFILES.iter().find(|(known, _)| *known == name)?;
     let completed = toml::from_str(text).map(|mut table: Table| {
@@ -53,7 +53,7 @@ pub(super) fn complete(own: Table, name: &str) -> Option<Result<Completed, toml:
     Some(completed)
 }
 
-/// Puts `own` over `base`, table by table.
+/// Overwrites `base` with the values of `own`, table by table.
 fn merge(base: &mut Table, own: Table) {
     for (key, value) in own {
         match (base.get_mut(&key), value) {

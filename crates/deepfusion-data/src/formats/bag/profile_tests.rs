@@ -7,7 +7,7 @@ fn umad(own: &str) -> BagConfig {
     BagConfig::over_profile(own, "umad").unwrap().unwrap()
 }
 
-/// Each is read as the file beside a bag is, and names no file.
+/// Each profile is a valid file beside a bag, and names no files.
 #[test]
 fn profiles_are_files_as_those_beside_bags() {
     for (name, text) in PROFILES {
@@ -36,7 +36,7 @@ fn what_the_bags_file_says_goes_before_it() {
         umad("[cam_from_lidar]\ntranslation = [0.0, 0.1, 0.0]\nrotation = [0.0, 0.0, 0.0]\n");
     assert_eq!(config.cam_from_lidar.unwrap().translation, [0.0, 0.1, 0.0]);
     assert!(config.profile_mounts.cam_from_lidar.is_none());
-    // CameraInfo goes before the profile's camera, the file's own before CameraInfo.
+    // CameraInfo takes precedence over the profile's camera, the file's own camera over CameraInfo.
     assert!(config.camera.is_none());
     assert_eq!(config.profile_camera.unwrap().cy, 117.60);
     assert!(BagConfig::over_profile(Table::new(), "kitti").is_none());

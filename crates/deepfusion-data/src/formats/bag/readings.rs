@@ -1,4 +1,4 @@
-//! What a message says of the vehicle's speed or its steering, whichever type it has.
+//! The vehicle's speed or steering from a message of any supported type.
 
 use super::config::BagConfig;
 use super::odometry_poses::pose_without_twist;
@@ -10,16 +10,16 @@ use deepfusion_rosbag::msg::{
     TwistWithCovarianceStamped,
 };
 
-/// What a message about the speed says.
+/// The values in a message with the speed.
 pub(super) struct Reading {
     pub(super) speed_mps: f64,
-    /// The velocity across it, by a twist: to the left, in the vehicle's axes.
+    /// The lateral velocity in a twist, positive to the left, in the vehicle's axes.
     pub(super) across_mps: Option<f64>,
     /// Roll, pitch and yaw rate, in rad/s.
     pub(super) rates: Option<[f64; 3]>,
-    /// The frame that has this speed.
+    /// The frame that the speed refers to.
     pub(super) frame: Option<String>,
-    /// `world_from_body`, of an odometry that leaves its twist at 0.
+    /// `world_from_body` of an odometry message whose twist is 0.
     pub(super) pose: Option<Se3>,
 }
 
@@ -36,10 +36,10 @@ impl Reading {
     }
 }
 
-/// The vehicle's forward speed by whatever message holds it.
+/// The vehicle's forward speed and what else the message contains.
 ///
 /// # Errors
-/// [`crate::Error::Bag`]; [`crate::Error::Config`] for a bare number without a unit.
+/// [`crate::Error::Bag`]; [`crate::Error::Config`] for a plain number without a unit.
 pub(super) fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
     if message.is::<TwistStamped>() {
         let twist: TwistStamped = message.decode()?;
@@ -82,7 +82,7 @@ pub(super) fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Readi
     })
 }
 
-/// The steering angle in radians, by whatever message holds it.
+/// The steering angle in radians.
 ///
 /// # Errors
 /// [`crate::Error::Bag`].
@@ -94,7 +94,7 @@ pub(super) fn steering(message: &Message<'_>) -> Result<f64> {
     number(message)
 }
 
-/// A bare number.
+/// A plain number.
 fn number(message: &Message<'_>) -> Result<f64> {
     Ok(if message.is::<Float32>() {
         f64::from(message.decode::<Float32>()?.data)

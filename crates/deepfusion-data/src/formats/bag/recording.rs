@@ -16,7 +16,7 @@ use deepfusion_rosbag::MessageSource;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Longest gap between exact poses across which the vehicle is taken to have moved evenly, in seconds.
+/// Longest gap between exact poses that is interpolated, in seconds.
 const POSE_GAP_S: f64 = 0.5;
 
 /// A bag with a camera.
@@ -26,15 +26,15 @@ pub(super) struct BagRecording {
     pub(super) bag: Arc<dyn MessageSource>,
     pub(super) topics: Topics,
     pub(super) images: Vec<MessageRef>,
-    /// Where the images are packets of a stream.
+    /// The video stream, if the images are packets of one.
     pub(super) video: Option<BagVideo>,
     pub(super) lens: Lens,
     pub(super) streams: Vec<Stream>,
     pub(super) mounts: Vec<Mount>,
     pub(super) damage: Vec<DataWarning>,
-    /// Those of `damage` among them.
+    /// All warnings, including those in `damage`.
     pub(super) warnings: Vec<DataWarning>,
-    /// Where the vehicle was, exactly, on the vehicle's clock.
+    /// The vehicle's exact poses, on the vehicle's clock.
     pub(super) truth: Trajectory,
     pub(super) cam_from_vehicle: Se3,
     pub(super) scans: Option<Arc<BagScans>>,
@@ -166,7 +166,7 @@ impl Recording for BagRecording {
     }
 
     fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
-        // Where nothing says how the camera looks it may have been aimed since.
+        // An assumed viewing direction may have been corrected from the images since.
         let cam_from_vehicle = dataset.cam_from_vehicle().unwrap_or(self.cam_from_vehicle);
         let vehicle_from_cam = cam_from_vehicle.inverse();
         let mut paths = Vec::new();

@@ -1,4 +1,4 @@
-//! A LiDAR message as points with radial velocities, seen from a frame's camera.
+//! Reads a LiDAR message as points with radial velocities, and projects them into a frame's camera.
 
 use super::config::{LidarConfig, Sign};
 use super::doppler::{ego_velocity, ground_radial};
@@ -20,44 +20,44 @@ const VELOCITY_NAMES: [&str; 6] = [
     "vel",
     "v",
 ];
-/// Of a scan that agrees with one velocity in less than this share, the vehicle's is taken instead.
+/// If a smaller fraction of a scan's points agrees with its estimated velocity, the vehicle's is used instead.
 pub(super) const LEAST_STATIC: f64 = 0.4;
-/// Points of so many seconds share a pose: at 50 m/s they are 5 mm off at most.
+/// Points within this time share a pose, in seconds: at 50 m/s, the error is at most 5 mm.
 const STEP_S: f64 = 1e-4;
 
-/// Points in the LiDAR's axes (x forward, y left, z up), metres.
+/// A scan's points.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scan {
     pub(super) xyz: Vec<[f32; 3]>,
-    /// m/s against the sensor, receding is positive.
+    /// Radial velocities relative to the sensor, m/s, receding is positive.
     pub(super) radial: Option<Vec<f32>>,
-    /// When each point was measured, in seconds after the scan's time; without them all were then, or are where they would have been.
+    /// Times of the points, in seconds after the scan's time. Without them, all points are from the scan's time, or compensated for motion.
     pub(super) after_s: Option<Vec<f32>>,
 }
 
-/// A scan as a frame's camera sees it. H×W, row by row.
+/// A scan projected into a frame's camera. H×W, row by row.
 #[derive(Debug, Clone)]
 pub(super) struct SeenScan {
     /// Camera z in metres, 0 = none.
     pub(super) depth: DepthMap,
-    /// The scan's point that a pixel's depth is of; [`SeenScan::NONE`] where there is none.
+    /// Index of the scan's point at each pixel; [`SeenScan::NONE`] if there is none.
     point: Vec<u32>,
 }
 
 impl SeenScan {
     const NONE: u32 = u32::MAX;
 
-    /// What each pixel's point has, of one value a point of the scan; `none` where a pixel has no point.
+    /// The value of each pixel's point, given one value per point of the scan; `none` for pixels without a point.
     pub(super) fn pixels<T: Copy>(&self, of_points: &[T], none: T) -> Vec<T> {
         let value = |point: &u32| of_points.get(*point as usize).copied().unwrap_or(none);
         self.point.iter().map(value).collect()
     }
 }
 
-/// The points of a cloud alone.
+/// Only the positions of a cloud's points, metres.
 ///
 /// # Errors
-/// [`Error::Bag`] for a message that is no cloud; [`Error::Topic`] without x, y and z.
+/// [`Error::Bag`] if the message is not a point cloud; [`Error::Topic`] without x, y and z.
 pub(super) fn points(bag: &dyn MessageSource, message: &Message<'_>) -> Result<Vec<[f32; 3]>> {
     let cloud: PointCloud2<'_> = message.decode()?;
     xyz(|name| column(bag, message, &cloud, name))
@@ -112,8 +112,8 @@ fn times(
 
 impl Scan {
     /// # Errors
-    /// [`Error::Bag`] for a message that is no cloud; [`Error::Topic`] without x, y and z, or without a field that
-    /// the settings name, and for times that are none.
+    /// [`Error::Bag`] if the message is not a point cloud; [`Error::Topic`] without x, y and z, without a field named in
+    /// the settings, or for invalid times.
     pub(super) fn decode(
         bag: &dyn MessageSource,
         message: &Message<'_>,
@@ -144,9 +144,9 @@ impl Scan {
         })
     }
 
-    /// Each point's own speed along its ray, m/s; `vehicle` is the sensor's velocity (its axes) by the vehicle, where
-    /// that is known. What stands still in the scan says the same and is freer of the clocks' differences: it is
-    /// taken where enough of the scan agrees.
+    /// Each point's own speed along its ray, m/s. `vehicle` is the sensor's velocity (its axes) according to the vehicle, if
+    /// known. The velocity estimated from the scan's static points does not depend on the clocks' offset, so it is
+    /// used if enough of the scan agrees.
     pub(super) fn ground_radial(
         &self,
         vehicle: Option<Vector3<f64>>,
@@ -163,8 +163,8 @@ impl Scan {
         Some(ground_radial(&self.xyz, radial, &velocity))
     }
 
-    /// The scan from a camera; the nearest point wins a pixel. `cam_from_lidar` is from the LiDAR, so many seconds after the scan's time, to
-    /// the camera at the frame's.
+    /// The scan projected into a camera; the nearest point wins a pixel. `cam_from_lidar` takes seconds after the scan's time, and gives
+    /// the transform from the LiDAR at that time to the camera at the frame's time.
     pub(super) fn seen(&self, cam_from_lidar: impl Fn(f64) -> Se3, k: &Intrinsics) -> SeenScan {
         let (width, height) = (k.width as usize, k.height as usize);
         let mut depth = DepthMap::empty(width, height);
@@ -201,7 +201,7 @@ impl Scan {
     }
 }
 
-/// Whether a point is one: drivers fill rays without an echo with zeros or NaN.
+/// Whether a point is valid: drivers fill rays without a return with zeros or NaN.
 pub(super) fn usable(point: &[f32; 3]) -> bool {
     let length = Vector3::from(*point).norm();
     length.is_finite() && length > 0.1
@@ -211,7 +211,7 @@ pub(super) fn usable(point: &[f32; 3]) -> bool {
 mod tests {
     use super::*;
 
-    /// A ray without an echo would else be the scanner itself, wherever it stands in the image.
+    /// A ray without a return would otherwise be a point at the scanner's own position, which may be in the image.
     #[test]
     fn a_ray_without_an_echo_is_no_depth() {
         let scan = Scan {
@@ -230,7 +230,7 @@ mod tests {
         assert_eq!(known, [9.0]);
     }
 
-    /// A wall that a turning scanner measures 10 m ahead at its left before the frame and at its right after it, driving at 10 m/s.
+    /// A wall 10 m ahead, measured by a rotating scanner on its left before the frame and on its right after it, while driving at 10 m/s.
     #[test]
     fn each_point_is_seen_from_where_it_was_measured() {
         let scan = Scan {

@@ -1,4 +1,4 @@
-//! The scans of a bag as its camera sees them: depth, velocities, dynamic points.
+//! The scans of a bag in its camera: depth, velocities, dynamic points.
 
 use super::config::LidarConfig;
 use super::doppler::ego_velocity;
@@ -14,17 +14,17 @@ use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Half the interval over which a yaw rate is measured, seconds.
+/// Half the interval over which a yaw rate is computed, seconds.
 const YAW_RATE_REACH_S: f64 = 0.05;
 
-/// The scans of a bag as its camera sees them.
+/// The scans of a bag, for projection into its camera.
 #[derive(Debug)]
 pub(super) struct BagScans {
     pub(super) bag: Arc<dyn MessageSource>,
     pub(super) topic: String,
-    /// Each scan's place and its time on the frames' clock.
+    /// Each scan's position in the bag, and its time on the frames' clock.
     pub(super) places: Vec<(MessageRef, f64)>,
-    /// Those points of the scans that move, by another topic.
+    /// The dynamic points of the scans, from another topic.
     pub(super) dynamic: Option<DynamicPoints>,
     pub(super) lidar: LidarConfig,
     pub(super) within_s: f64,
@@ -38,7 +38,7 @@ impl BagScans {
     /// The scan nearest in time to a frame, if it is near enough, and its time.
     ///
     /// # Errors
-    /// As [`Scan::decode`].
+    /// Those of [`Scan::decode`].
     fn scan(&self, frame_s: f64) -> Result<Option<(Scan, f64)>> {
         let Some((place, time_s)) = index::nearest(&self.places, frame_s, self.within_s) else {
             return Ok(None);
@@ -51,8 +51,8 @@ impl BagScans {
         Scan::decode(self.bag.as_ref(), &message, &self.lidar)
     }
 
-    /// A scan as a frame's camera sees it: what stands still is brought to the frame's time by the vehicle's motion
-    /// meanwhile, each point from its own time where it has one.
+    /// A scan in a frame's camera: static points are moved to the frame's time with the vehicle's motion, each from
+    /// its own time if it has one.
     fn seen(&self, scan: &Scan, frame_s: f64, scan_s: f64) -> SeenScan {
         let cam_from_lidar =
             |after_s: f64| self.frame_from_scan(frame_s, scan_s + after_s) * self.cam_from_lidar;
@@ -64,13 +64,13 @@ impl BagScans {
         scan.ground_radial(self.sensor_velocity(scan_s), self.lidar.over_ground)
     }
 
-    /// Which points move by their speeds over ground.
+    /// Which points move according to their speeds over ground.
     fn fast(&self, ground: &[f32]) -> Vec<bool> {
         let limit = self.lidar.moving_mps as f32;
         ground.iter().map(|v| v.abs() > limit).collect()
     }
 
-    /// Which points the topic of dynamic points lists; `None` without it, or where it is not of this scan.
+    /// Which points are listed by the topic of dynamic points; `None` without that topic, or if its list belongs to another scan.
     fn listed(&self, scan: &Scan, scan_s: f64) -> Result<Option<MatchedPoints>> {
         let Some(dynamic) = &self.dynamic else {
             return Ok(None);
@@ -78,7 +78,7 @@ impl BagScans {
         dynamic.of(self.bag.as_ref(), &scan.xyz, scan_s, self.within_s)
     }
 
-    /// Camera at the frame's time from camera at the scan's.
+    /// The transform from the camera at the scan's time to the camera at the frame's time.
     fn frame_from_scan(&self, frame_s: f64, scan_s: f64) -> Se3 {
         let (from_s, to_s) = (frame_s.min(scan_s), frame_s.max(scan_s));
         let motion = self.track.as_ref().and_then(|t| t.motion(from_s, to_s));
@@ -93,7 +93,7 @@ impl BagScans {
         }
     }
 
-    /// The LiDAR's velocity over ground at a time, its axes, m/s, by the vehicle: v and ω × r.
+    /// The LiDAR's velocity over ground at a time according to the vehicle, in the LiDAR's axes, m/s: v + ω × r.
     fn sensor_velocity(&self, time_s: f64) -> Option<Vector3<f64>> {
         let track = self.track.as_ref()?;
         let speed = track.speed_at(time_s)?;
@@ -113,13 +113,13 @@ impl BagScans {
     /// A frame's ground truth, H×W; `None` without a scan.
     ///
     /// # Errors
-    /// As [`Self::scan`].
+    /// Those of [`Self::scan`].
     pub(super) fn depth(&self, frame_s: f64) -> Result<Option<DepthMap>> {
         let scan = self.scan(frame_s)?;
         Ok(scan.map(|(scan, scan_s)| self.seen(&scan, frame_s, scan_s).depth))
     }
 
-    /// As [`crate::Recording::scan_truth`].
+    /// See [`crate::Recording::scan_truth`].
     pub(super) fn truth(&self, frame_s: f64) -> Result<Option<ScanTruth>> {
         let Some((scan, scan_s)) = self.scan(frame_s)? else {
             return Ok(None);
@@ -132,11 +132,11 @@ impl BagScans {
         }))
     }
 
-    /// Which pixels of a frame's ground truth move: by the radial velocities, or, where the scan has none, by the topic
+    /// Which pixels of a frame's ground truth move: according to the radial velocities or, if the scan has none, to the topic
     /// of dynamic points. `None` without a scan or without either.
     ///
     /// # Errors
-    /// As [`Self::scan`].
+    /// Those of [`Self::scan`].
     pub(super) fn moving(&self, frame_s: f64) -> Result<Option<Vec<bool>>> {
         let Some((scan, scan_s)) = self.scan(frame_s)? else {
             return Ok(None);
@@ -152,7 +152,7 @@ impl BagScans {
         Ok(moves.map(|moves| seen.pixels(&moves, false)))
     }
 
-    /// As [`crate::Recording::dynamic_agreement`].
+    /// See [`crate::Recording::dynamic_agreement`].
     pub(super) fn agreement(&self, most: usize) -> Result<Option<DynamicAgreement>> {
         let mut sum = DynamicAgreement::default();
         let step = self.places.len().div_ceil(most.max(1)).max(1);
@@ -175,7 +175,7 @@ impl BagScans {
         Ok((sum.scans > 0).then_some(sum))
     }
 
-    /// As [`crate::Recording::lidar_motion`].
+    /// See [`crate::Recording::lidar_motion`].
     pub(super) fn motion(&self, most: usize) -> Result<Vec<LidarMotion>> {
         if self.lidar.over_ground || most == 0 {
             return Ok(Vec::new());
@@ -189,7 +189,7 @@ impl BagScans {
             else {
                 continue;
             };
-            // Without a start: what the vehicle says must not colour what the scan says.
+            // Without an initial value, so that the estimate does not depend on the vehicle's velocity.
             let ego = ego_velocity(&scan.xyz, radial, None);
             if let Some(ego) = ego.filter(|ego| ego.static_share >= LEAST_STATIC) {
                 motions.push(LidarMotion {
@@ -202,7 +202,7 @@ impl BagScans {
         Ok(motions)
     }
 
-    /// Whether its points carry velocities: by the first scan.
+    /// Whether the points have velocities, according to the first scan.
     pub(super) fn has_velocities(&self) -> Result<bool> {
         let Some((place, _)) = self.places.first() else {
             return Ok(false);
@@ -215,7 +215,7 @@ impl BagScans {
 #[derive(Debug)]
 pub(super) struct MovingPoints {
     pub(super) scans: Arc<BagScans>,
-    /// Of the frames, by number, in seconds.
+    /// Times of the frames in seconds, by frame number.
     pub(super) times_s: BTreeMap<u64, f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Speed, steering and inertial unit as one motion.
+//! Computes the vehicle's motion from speed, steering and inertial unit.
 
 use super::config::BagConfig;
 use super::index::Index;
@@ -13,14 +13,14 @@ use std::path::Path;
 /// A vehicle's motion.
 pub(super) struct Motion {
     pub(super) track: MotionModel,
-    /// Whether anything measured its turns.
+    /// Whether its turns were measured.
     pub(super) yaw_known: bool,
 }
 
-/// The vehicle's motion by all its sensors, on the vehicle's clock counted from `origin_ns`; `None` without a speed.
+/// The vehicle's motion from all its sensors, on the vehicle's clock counted from `origin_ns`; `None` without a speed.
 ///
 /// # Errors
-/// [`Error::InertialUnit`], [`Error::Motion`] where the sensors cannot be read as configured, or contradict each other.
+/// [`Error::InertialUnit`], [`Error::Motion`] if the sensors cannot be used as configured, or contradict each other.
 pub(super) fn motion(
     bag: &Path,
     index: &Index,
@@ -32,7 +32,7 @@ pub(super) fn motion(
         return Ok(None);
     }
     let turns = index.says_turns();
-    // A steering angle without a wheelbase tells no turn: it does not stand in for a yaw rate that was measured.
+    // A steering angle without a wheelbase gives no turn, so it cannot replace a measured yaw rate.
     let steered = !index.steering_rad.is_empty() && config.vehicle.wheelbase_m.is_some();
     if turns && index.imu.is_empty() && !steered {
         return Ok(Some(by_twist(index, origin_ns)));
@@ -63,7 +63,7 @@ pub(super) fn motion(
         translation_m: t.translation().into(),
     });
     let motion = MotionConfig {
-        // The index scaled the speeds already.
+        // The index has already scaled the speeds.
         speed_scale: 1.0,
         bicycle: vehicle.wheelbase_m.map(|wheelbase_m| Bicycle {
             steering_ratio: vehicle.steering_ratio.unwrap_or(1.0),
@@ -83,7 +83,7 @@ pub(super) fn motion(
     }))
 }
 
-/// Why sensors make no motion: an inertial unit that is at fault alone can be left out.
+/// The error about unusable sensors. If only the inertial unit is at fault, it can be left out.
 fn refusal(bag: &Path, config: &BagConfig, source: deepfusion_motion::Error) -> Error {
     use deepfusion_motion::Error as Reason;
     let path = bag.to_owned();
@@ -104,7 +104,7 @@ fn refusal(bag: &Path, config: &BagConfig, source: deepfusion_motion::Error) -> 
     }
 }
 
-/// A vehicle that says its yaw rate itself, and has no other sensor for it.
+/// The motion of a vehicle whose speed messages have a yaw rate, without another sensor for it.
 fn by_twist(index: &Index, origin_ns: i64) -> Motion {
     let readings = index.speed_mps.iter().zip(&index.yaw_rate);
     let mut samples: Vec<(f64, f64, f64)> = readings
@@ -113,7 +113,7 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
     samples.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut track = VehicleTrack::new(&samples);
     if samples.iter().any(|(_, _, yaw_rate)| !yaw_rate.is_finite()) {
-        // A speed is known without a yaw rate beside it.
+        // Keep speeds without a yaw rate.
         let speeds: Vec<_> = samples
             .iter()
             .map(|(t, speed, _)| (*t, *speed, 0.0))
@@ -139,8 +139,8 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
     }
 }
 
-/// The rates of roll and pitch, each at its time. They are integrated over a pair of frames alone: the sum of all before it would tilt the vehicle by
-/// the rates' bias, and on a ramp by the turns themselves.
+/// The rates of roll and pitch with their times. They are only integrated between two frames: integrated from the beginning, their bias
+/// would tilt the vehicle, and so would turns on a ramp.
 fn tilt_rates(index: &Index, origin_ns: i64) -> Vec<(f64, [f64; 2])> {
     let mut rates = index.tilt_rates.clone();
     rates.sort_by_key(|(ns, _)| *ns);

@@ -1,11 +1,11 @@
-//! Which files are bags, and the reader of each kind.
+//! Recognises bags, and opens the reader for each kind.
 
 use crate::{Error, Result};
 use deepfusion_rosbag::{Bag, MessageSource};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Whether a path is a bag: of ROS 1 by its name, of ROS 2 where this was built with `ros2`.
+/// Whether a path is a bag: a ROS 1 bag by its name, a ROS 2 bag if built with the feature `ros2`.
 pub(crate) fn is_bag(path: &Path) -> bool {
     is_ros1_bag(path) || is_ros2_bag(path)
 }
@@ -46,7 +46,7 @@ pub(crate) fn bags_in(folder: &Path) -> Result<Vec<PathBuf>> {
 pub(super) fn open(path: &Path) -> Result<Arc<dyn MessageSource>> {
     #[cfg(feature = "ros2")]
     {
-        // The reader goes by the name, which a link need not have.
+        // The reader depends on the file name, which a link may lack.
         let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         if let Some(bag) = [path, real.as_path()]
             .into_iter()
@@ -58,7 +58,7 @@ pub(super) fn open(path: &Path) -> Result<Arc<dyn MessageSource>> {
     Ok(Arc::new(Bag::open(path)?))
 }
 
-/// A bag's name: the file's without its ending, or the folder's.
+/// A bag's name: the file's name without its extension, or the folder's name.
 pub(super) fn name(path: &Path) -> String {
     let name = if path.is_dir() {
         path.file_name()

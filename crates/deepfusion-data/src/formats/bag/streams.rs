@@ -1,4 +1,4 @@
-//! What a bag holds, topic by topic, and what of it cannot be read.
+//! The streams of a bag, and its unreadable parts.
 
 use super::index::Index;
 use super::packet::VideoTopic;
@@ -47,7 +47,7 @@ pub(super) fn streams(
     Ok(streams.collect())
 }
 
-/// What of a bag cannot be read.
+/// Warnings about unreadable parts of a bag.
 pub(super) fn damage_of(bag: &dyn MessageSource, index: &Index) -> Vec<DataWarning> {
     let damaged = bag.damage().map(IncompleteWarning::Damaged);
     let unreadable = index
@@ -61,7 +61,7 @@ pub(super) fn damage_of(bag: &dyn MessageSource, index: &Index) -> Vec<DataWarni
     damage.map(DataWarning::from).collect()
 }
 
-/// What is odd about a bag that can be read.
+/// Warnings about oddities of a readable bag.
 pub(super) fn oddities_of(topics: &Topics, index: &Index) -> Vec<DataWarning> {
     let late = index.video.as_ref().and_then(VideoTopic::warning);
     let mut warnings: Vec<DataWarning> = late.into_iter().map(DataWarning::from).collect();

@@ -1,4 +1,4 @@
-//! Which topic is which: by message type, unless the file beside the bag names it.
+//! Assigns topics to roles: by message type, unless the file beside the bag names them.
 
 use super::commands::is_command;
 use super::config::BagConfig;
@@ -11,32 +11,31 @@ use deepfusion_rosbag::msg::{
 use deepfusion_rosbag::{MessageSource, RosMessage, TopicInfo};
 use std::path::{Path, PathBuf};
 
-/// The topics that are read, and what for.
+/// The topics that are read, with their roles.
 #[derive(Debug, Clone)]
 pub(super) struct Topics {
     pub(super) found: Vec<(TopicRole, String)>,
-    /// Those of transforms, as many as there are: none has a key in `[topics]`.
+    /// All topics of transforms; these have no key in `[topics]`.
     pub(super) frames: Vec<String>,
-    /// Whether there are those that only a simulator can write.
+    /// Whether there are topics that only a simulator can write.
     pub(super) simulated: bool,
-    /// What was taken for want of something better.
+    /// Warnings about topics that were used for lack of better ones.
     pub(super) warnings: Vec<DataWarning>,
 }
 
-/// Exact data of a simulated drive: never taken for a sensor.
+/// Prefix of topics with exact data of a simulated drive, which are never used as a sensor.
 const TRUTH: &str = "/truth/";
-/// What `simulate` writes beside the sensors and nobody can record: the exact motion, and the exact depth of every pixel.
+/// Topics of `simulate` with data that cannot be recorded: the exact motion, and the exact depth of every pixel.
 const EXACT_MOTION: &str = "/truth/odometry";
 const EXACT_DEPTH: &str = "/truth/depth/compressed";
-/// In the name of a second cloud, of dynamic points only.
+/// Part of the name of a second point cloud, with only the dynamic points.
 const DYNAMIC: &str = "dynamic";
 
 impl Topics {
-    /// Looks for each role's topic.
+    /// Finds each role's topic.
     ///
     /// # Errors
-    /// [`Error::Topic`] where the file names a topic that is not there, or several could be meant;
-    /// [`Error::Bag`].
+    /// [`Error::Topic`] if a named topic does not exist, or several are possible; [`Error::Bag`].
     pub(super) fn find(bag: &dyn MessageSource, config: &BagConfig) -> Result<Self> {
         let all = bag.topics()?;
         let search = Search {
@@ -55,7 +54,7 @@ impl Topics {
                 !is_depth(&t.name)
             })
         };
-        // Of a camera that was recorded as pictures and as a video the pictures count: they can be read one by one.
+        // If a camera was recorded both as images and as a video, use the images, which can be read one by one.
         let image = match names.image {
             None => image(&pictures)?
                 .map_or_else(|| image(&super::packet::TYPES), |found| Ok(Some(found)))?,
@@ -119,18 +118,18 @@ impl Topics {
         found.map(|(_, name)| name.as_str())
     }
 
-    /// What a topic is for; one topic can have several roles (speed and steering).
+    /// The roles of a topic, which can be several (speed and steering).
     pub(super) fn roles<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = TopicRole> + 'a {
         let of_topic = self.found.iter().filter(move |(_, name)| name == topic);
         of_topic.map(|(role, _)| *role)
     }
 
-    /// Whether a topic holds transforms of frames.
+    /// Whether a topic has transforms of frames.
     pub(super) fn holds_frames(&self, topic: &str) -> bool {
         self.frames.iter().any(|name| name == topic)
     }
 
-    /// The names of all of them.
+    /// The names of all topics that are read.
     pub(super) fn names(&self) -> Vec<&str> {
         let found = self.found.iter().map(|(_, name)| name);
         let mut names: Vec<&str> = found.chain(&self.frames).map(String::as_str).collect();
@@ -139,14 +138,14 @@ impl Topics {
     }
 }
 
-/// Whether a bag has what only a simulator can write.
+/// Whether a bag has topics that only a simulator can write.
 fn are_simulated(all: &[TopicInfo]) -> bool {
     let has = |fits: &dyn Fn(&TopicInfo) -> bool| all.iter().any(fits);
     has(&|t| t.name == EXACT_MOTION && t.type_name == Odometry::TYPE)
         && has(&|t| t.name == EXACT_DEPTH)
 }
 
-/// A warning for each command that stands for what was measured, as nothing better is there; none for one that is named.
+/// A warning for each command that is used as a measurement for lack of a better topic, unless the topic was named.
 fn commands(found: &[(TopicRole, String)], config: &BagConfig) -> Vec<DataWarning> {
     let names = &config.topics;
     let steers = config.vehicle.wheelbase_m.is_some();
@@ -181,17 +180,17 @@ struct Search<'a> {
     all: &'a [TopicInfo],
     bag: &'a Path,
     config: &'a Path,
-    /// Roles whose topics the caller named, and not the file.
+    /// Roles whose topics were named by the caller instead of the file.
     given: &'a [TopicRole],
 }
 
 impl Search<'_> {
-    /// The file beside the bag, where that names a role's topic.
+    /// Path of the file beside the bag, if it names the role's topic.
     fn named_in(&self, role: TopicRole) -> Option<PathBuf> {
         (!self.given.contains(&role)).then(|| self.config.to_owned())
     }
 
-    /// The topic that the file names, or the only one of these types; none where it names none.
+    /// The named topic, or the only one of these types; `None` if no topic is to be read or found.
     fn one(
         &self,
         role: TopicRole,
@@ -239,8 +238,8 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a quantity is read from CAN frames. No topic is looked for then: the values of two sources, each with its
-    /// own scale, would be read as one's. That none is to be read does not contradict a signal.
+    /// Whether a quantity is read from CAN frames. Then no topic is looked for, because the values of two sources with
+    /// different scales would be mixed. A topic named `none` does not contradict a signal.
     fn on_can(&self, role: TopicRole, signal: bool, named: &Option<String>) -> Result<bool> {
         match named {
             Some(name) if signal && name != NamedTopic::NONE => Err(Error::Topic {
@@ -255,7 +254,7 @@ impl Search<'_> {
         }
     }
 
-    /// The topic of CAN frames, without which `[can]` would silently say nothing.
+    /// The topic of CAN frames; an error if there is none, because `[can]` would silently have no effect.
     fn can(&self, named: &Option<String>) -> Result<String> {
         self.one(TopicRole::Can, named, &[Frame::TYPE], |_| true)?
             .ok_or_else(|| {
@@ -265,7 +264,7 @@ impl Search<'_> {
             })
     }
 
-    /// The steering angle: a message that says so by its type. A bare number must be named.
+    /// The topic of the steering angle, by its message type. A topic of plain numbers must be named.
     fn steering(&self, named: &Option<String>) -> Result<Option<String>> {
         let any = [AckermannDriveStamped::TYPE, Float32::TYPE, Float64::TYPE];
         if named.is_some() {
@@ -274,7 +273,7 @@ impl Search<'_> {
         self.measured(TopicRole::Steering, &any[..1])
     }
 
-    /// The topic of the first of these types that there is; of a name that says a command only where no other is there.
+    /// The topic of the first of these types in the bag; one with commands only if there is no other.
     fn measured(&self, role: TopicRole, types: &[&str]) -> Result<Option<String>> {
         for commanded in [false, true] {
             for kind in types {
@@ -287,8 +286,8 @@ impl Search<'_> {
         Ok(None)
     }
 
-    /// The vehicle's speed: a twist, else an odometry, else steering messages with a speed, else satellite positions to compute
-    /// it from; never two of them. A bare number must be named, since its unit must be said too.
+    /// The topic of the vehicle's speed: a twist, otherwise an odometry, otherwise steering messages with a speed, otherwise GPS
+    /// positions; never two of them. A topic of plain numbers must be named, since its unit is needed too.
     fn speed(&self, named: &Option<String>) -> Result<Option<String>> {
         let any = [
             TwistStamped::TYPE,
@@ -312,7 +311,7 @@ impl Search<'_> {
         self.measured(TopicRole::Speed, &kinds)
     }
 
-    /// The cloud of dynamic points: of several in the bag the one in the LiDAR's namespace. Without a LiDAR it is of no use.
+    /// The topic of dynamic points; if there are several, the one in the LiDAR's namespace. None without a LiDAR.
     fn dynamic(&self, named: &Option<String>, lidar: Option<&str>) -> Result<Option<String>> {
         let clouds = [PointCloud2::<'_>::TYPE];
         let one = |fits: &dyn Fn(&str) -> bool| {
@@ -333,13 +332,13 @@ impl Search<'_> {
         }
     }
 
-    /// The camera's calibration: of several in the bag the one beside the images.
+    /// The topic of the camera's calibration; if there are several, the one in the images' namespace.
     fn camera_info(&self, named: &Option<String>, image: Option<&str>) -> Result<Option<String>> {
         let kinds = [CameraInfo::TYPE];
         let one = |fits: &dyn Fn(&str) -> bool| {
             self.one(TopicRole::CameraInfo, named, &kinds, |t| fits(&t.name))
         };
-        // `/camera/image_raw/compressed` is the same camera's as `/camera/image_raw`; so is what the transport `ffmpeg` sends.
+        // `/camera/image_raw/compressed` and the transport's `/camera/image_raw/ffmpeg` belong to the same camera as `/camera/image_raw`.
         let transported = |name: &'static str| image.and_then(|i| i.strip_suffix(name));
         let raw = transported("/compressed")
             .or(transported("/ffmpeg"))

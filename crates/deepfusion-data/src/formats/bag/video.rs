@@ -1,8 +1,8 @@
 //! A camera whose messages are packets of a video stream: `foxglove_msgs/CompressedVideo`, `ffmpeg_image_transport_msgs/FFMPEGPacket`, and
-//! `sensor_msgs/CompressedImage` whose format is a codec's.
+//! `sensor_msgs/CompressedImage` with a video codec as its format.
 //!
-//! A packet needs those before it, so that nothing can be read before the first key frame, and training, which reads in any order,
-//! reads files: all frames are decoded once (`deepfusion_video::PacketFrames`).
+//! Decoding a packet needs the previous ones, so nothing before the first key frame can be read. Since training reads frames in any
+//! order, all of them are decoded to files once (`deepfusion_video::PacketFrames`).
 
 use super::config::BagConfig;
 use super::index::Index;
@@ -21,7 +21,7 @@ pub(super) struct BagVideo {
 }
 
 impl BagVideo {
-    /// `None` where the images are none of a video.
+    /// `None` if the images are not packets of a video.
     ///
     /// # Errors
     /// [`crate::Error::File`].
@@ -43,17 +43,17 @@ impl BagVideo {
     /// The first frame, without decoding the others.
     ///
     /// # Errors
-    /// [`crate::Error::Video`], without ffmpeg too, and [`crate::Error::Bag`].
+    /// [`crate::Error::Video`], also without ffmpeg, and [`crate::Error::Bag`].
     pub(super) fn first(&self, bag: &dyn MessageSource) -> Result<RgbImage> {
         let mut packets = self.packets(bag)?;
         let first = packets.next().unwrap_or_else(|| Ok(Vec::new()))?;
         Ok(decode_rgb(&self.frames.first_picture(&first)?, bag.path())?)
     }
 
-    /// An image by its number in order of time; `None` where there is no such image.
+    /// An image by its number in order of time; `None` if there is no such image.
     ///
     /// # Errors
-    /// As [`PacketFrames::frame`], and [`crate::Error::Image`] for a file that was harmed since.
+    /// Those of [`PacketFrames::frame`], and [`crate::Error::Image`] for a decoded file that was damaged since.
     pub(super) fn load(&self, bag: &dyn MessageSource, number: u64) -> Result<Option<RgbImage>> {
         let place = usize::try_from(number).ok();
         let Some(packet) = place.and_then(|n| self.topic.order.get(n)) else {
@@ -74,19 +74,20 @@ impl BagVideo {
             let packet = packet(bag.path(), &message)?;
             Ok(packet.map_or(Vec::new(), |(_, data)| data.into_owned()))
         });
-        // What could not be read there is no loss, either.
+        // Unreadable messages before the first key frame do not matter either.
         let codec = self.topic.codec;
         Ok(packets.skip_while(move |packet| !matches!(packet, Ok(packet) if codec.begins(packet))))
     }
 }
 
-/// Where frames are kept: `<bag>.<topic>.frames`, beside the bag or, with a hash of its path, where the file beside it says.
+/// Path of the folder for decoded frames: `<bag>.<topic>.frames` beside the bag, or, with a hash of its path, in the cache folder of the
+/// file beside it.
 fn cache(bag: &Path, topic: &str, config: &BagConfig) -> PathBuf {
     let beside = bag.parent().unwrap_or(Path::new("."));
     let folder = config.cache.as_ref();
     let folder = folder.map_or(beside.to_owned(), |c| config.folder().join(c));
     let name = bag.file_name().unwrap_or_default().to_string_lossy();
-    // No topic has a dot in its name.
+    // Topic names cannot contain dots.
     let topic = topic.trim_matches('/').replace('/', ".");
     frames_folder(&folder, bag, &format!("{name}.{topic}"))
 }

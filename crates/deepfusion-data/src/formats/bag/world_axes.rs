@@ -1,16 +1,16 @@
-//! Velocities in the world's axes: a satellite receiver's, to the east and to the north, in a message that the vehicle's own has, too.
+//! Recognises velocities in world axes: a GPS receiver's, to the east and to the north, in the same message type as the vehicle's own.
 
-/// Slower than this a direction says little, m/s.
+/// Below this speed, the direction is unreliable, m/s.
 const LEAST_MPS: f64 = 2.0;
-/// Velocity across over velocity: 17° off the vehicle's x, which its rear axle does not do, nor a place ahead of it but in tight bends.
+/// Lateral velocity / speed: 17° off the vehicle's x, which never occurs at the rear axle, and ahead of it only in tight bends.
 const ACROSS: f64 = 0.3;
 
-/// The same, which no place on a vehicle has for long: 44°.
+/// The same ratio for 44°, which does not occur anywhere on a vehicle for long.
 const FAR_ACROSS: f64 = 0.7;
 
-/// Whether velocities (x, y; m/s) are along other axes than the vehicle's: of those that are fast enough, a quarter points far from x, and some point
-/// very far from it, or most are far. Of all headings two thirds are, but streets may run east and west for most of a drive; and the front of a
-/// vehicle in a car park is often far from its x, but never as far.
+/// Whether velocities (x, y; m/s) are in axes other than the vehicle's: of those that are fast enough, a quarter points far from x and some
+/// point very far from it, or most point far from it. Two thirds of all headings are far from x, but streets may run east and west for most
+/// of a drive. In a car park, the velocity at a vehicle's front is often far from x, but never very far.
 pub(super) fn are_world_axes(velocities: impl Iterator<Item = (f64, f64)>) -> bool {
     let across = velocities.filter_map(|(x, y)| {
         let speed = x.hypot(y);
@@ -30,7 +30,7 @@ pub(super) fn are_world_axes(velocities: impl Iterator<Item = (f64, f64)>) -> bo
 mod tests {
     use super::*;
 
-    /// A drive around a block at 10 m/s, to the north, the west, the south and the east; and one mostly to the east.
+    /// A drive around a block at 10 m/s (north, west, south, east), and one mostly to the east.
     #[test]
     fn a_course_is_not_taken_for_the_vehicle_s_axes() {
         let to = |course: f64| (10.0 * course.cos(), 10.0 * course.sin());
@@ -42,10 +42,10 @@ mod tests {
 
     #[test]
     fn a_vehicle_goes_along_its_own_axes() {
-        // Bends at a place 1.5 m ahead of the axle, reversing, and what is too slow to have a direction.
+        // Bends at a point 1.5 m ahead of the axle, reversing, and speeds too low to have a direction.
         let bend = |i: i32| (8.0, 1.5 * 0.4 * f64::from(i % 3 - 1));
         assert!(!are_world_axes((0..99).map(bend)));
-        // A car park, by an antenna 2.7 m ahead of the axle: bends of 5 m radius for a third of the way.
+        // A car park, with an antenna 2.7 m ahead of the axle: bends of 5 m radius for a third of the way.
         let parking = |i: i32| (3.0, if i % 3 == 0 { 3.0 * 2.7 / 5.0 } else { 0.1 });
         assert!(!are_world_axes((0..99).map(parking)));
         assert!(!are_world_axes((0..99).map(|_| (-5.0, 0.1))));

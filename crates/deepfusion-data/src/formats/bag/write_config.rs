@@ -1,4 +1,4 @@
-//! The file beside a bag, written of what was found in the bag: a beginning to correct and to complete.
+//! Writes the file beside a bag from what was found in the bag, for the user to correct and complete.
 
 use super::can_config::CanConfig;
 use super::commands::is_command;
@@ -16,27 +16,27 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
-/// What stands above every such file.
+/// Header of every such file.
 const HEAD: &str = concat!(
-    "# What is read of the bag beside this file, as it was found there. What stands here goes before what the\n",
-    "# bag itself says. Every key: ",
+    "# What is read from the bag beside this file. Values here take precedence over those in the bag.\n",
+    "# All keys: ",
     env!("CARGO_PKG_REPOSITORY"),
     "/blob/main/docs/reference/bag-toml.md\n"
 );
-/// What the tables of the file that was there already are followed by, where they have no such thing.
+/// Examples at the end of the file for tables that it does not have.
 const VEHICLE: &str = "\n# [vehicle]\n# wheelbase_m = 2.7        # without it steering angles are not used\n\
-    # speed_scale = 1.0        # true speed over the vehicle's\n";
-const CAMERA_PLACE: &str = "\n# Nothing says where the camera is on the vehicle: it is taken to look ahead and to move as the rear axle does.\n\
+    # speed_scale = 1.0        # true speed / measured speed\n";
+const CAMERA_PLACE: &str = "\n# The camera's mount is not given: assuming that it looks straight ahead from the rear axle.\n\
     # [cam_from_vehicle]       # camera: x right, y down, z forward; vehicle: x forward, y left, z up\n\
     # translation = [0.0, 1.2, -1.6]               # metres: a camera 1.6 m ahead of the rear axle, 1.2 m above it\n\
     # rotation = [1.2092, -1.2092, 1.2092]         # an axis-angle vector in radians: it looks ahead\n";
 
 /// Writes the file beside each bag at a path (`<bag>.toml`; `bag.toml` within a ROS 2 bag that is a folder): the topics, the
-/// mounts and who says them, and of the options the camera, the topics and the clock. What a file had to say before stays, its
-/// comments do not. Gives the files.
+/// mounts with their sources, and the camera, topics and clock from the options. Settings of an existing file are kept, its
+/// comments are not. Returns the files' paths.
 ///
 /// # Errors
-/// [`Error::Exists`] where there is such a file and `overwrite` is not set; [`Error::NotABag`]; what opening says.
+/// [`Error::Exists`] if the file exists and `overwrite` is not set; [`Error::NotABag`]; and the errors of opening the bag.
 pub fn write_bag_config(
     path: &Path,
     options: &OpenOptions,
@@ -63,7 +63,7 @@ pub fn write_bag_config(
     Ok(texts.into_iter().map(|(_, target)| target).collect())
 }
 
-/// The bag's own file, which no other bag of its folder reads.
+/// Path of the bag's own file, which is not shared with other bags of the folder.
 fn target(bag: &Path) -> Result<PathBuf> {
     let first = BagConfig::candidates(bag).into_iter().next();
     first.ok_or_else(|| Error::file(bag, ErrorKind::NotFound.into()))
@@ -116,7 +116,7 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
     let file = config.path.display().to_string();
     let mut text = String::from(HEAD);
     let is_table = |value: &Value| matches!(value, Value::Table(_));
-    // Bare keys belong above the first table.
+    // Top-level keys belong above the first table.
     for (key, value) in own.iter().filter(|(_, value)| !is_table(value)) {
         let _ = write!(text, "\n{key} = {value}");
     }
@@ -126,9 +126,9 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
     text += &topics_text(&topics, &config.topics, &bag.topics()?);
     if !own.contains_key("camera") && !own.contains_key("calibration") {
         text += match &index.camera_info {
-            Some(info) if info.k[0] > 0.0 => "\n# The camera is as CameraInfo has it.\n",
+            Some(info) if info.k[0] > 0.0 => "\n# The camera is taken from CameraInfo.\n",
             _ => {
-                "\n# The bag has no CameraInfo.\n# [camera]                 # pixels, of the images as they are\n\
+                "\n# The bag has no CameraInfo.\n# [camera]                 # in pixels of the bag's images\n\
                  # fx = 700.0\n# fy = 700.0\n# cx = 320.0\n# cy = 240.0\n# width = 640\n# height = 480\n"
             }
         };
@@ -152,7 +152,7 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
     Ok(text)
 }
 
-/// Takes the signals out of `[can]` that a caller's topic, or none of the caller's, stands for now: `read` has them no more.
+/// Removes the signals from `[can]` that the caller replaced by a topic or by `none`: `read` no longer has them.
 fn remove_named_signals(can: &mut Table, read: Option<&CanConfig>) {
     let signals = [
         (TopicRole::Speed, read.and_then(|can| can.speed.as_ref())),
@@ -168,7 +168,7 @@ fn remove_named_signals(can: &mut Table, read: Option<&CanConfig>) {
     }
 }
 
-/// `[topics]`: which was found for what, and for what none is to be read.
+/// `[topics]`: the topics found for each role, and the roles for which none is to be read.
 fn topics_text(
     topics: &Topics,
     names: &TopicNames,
@@ -180,10 +180,10 @@ fn topics_text(
         let about = about.map_or(String::new(), |t| {
             format!("   # {}, {}", t.type_name, count_of(t.count, "message"))
         });
-        // Written as a key it would stand for a choice of the user's, and nothing would warn of it any more.
+        // As a key it would count as the user's choice, and the warning about it would disappear.
         let own_choice = is_command(name) && names.of(*role).is_none();
         let off = if own_choice && matches!(role, TopicRole::Speed | TopicRole::Steering) {
-            "# by its name a command: "
+            "# a command by its name: "
         } else {
             ""
         };
@@ -199,11 +199,11 @@ fn topics_text(
     text
 }
 
-/// A transform, and who says it.
+/// A transform, with its source.
 fn mount_text(mount: &Mount, file: &str) -> String {
     let three = |v: [f64; 3]| format!("[{:?}, {:?}, {:?}]", v[0], v[1], v[2]);
     let source = if mount.source == file {
-        "as it was here before"
+        "as before in this file"
     } else {
         &mount.source
     };

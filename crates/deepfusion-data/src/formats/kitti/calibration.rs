@@ -1,4 +1,4 @@
-//! The three calibration files of a date.
+//! Reads the three calibration files of a date.
 
 use super::fields::{Fields, cam_from_cam0};
 use crate::{Camera, Error, MissingPart, Result};
@@ -6,41 +6,41 @@ use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4, Vector3};
 use std::path::{Path, PathBuf};
 
-/// How one rectified colour camera sees the world, and where it sits on the car.
+/// Intrinsics and mount of one rectified colour camera.
 ///
 /// Frames: camera x right, y down, z forward; velodyne and IMU x forward, y left, z up. Metres.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    /// The camera these values are of.
+    /// The camera to which these values belong.
     pub camera: Camera,
-    /// Of the rectified image (`P_rect`, `S_rect`), in pixels.
+    /// Intrinsics of the rectified image (`P_rect`, `S_rect`), in pixels.
     pub intrinsics: Intrinsics,
-    /// A velodyne point in the rectified camera: `R_rect_00`, velo_to_cam and the offset of this camera
-    /// from camera 0 that `P_rect` holds. `None` without calib_velo_to_cam.txt.
+    /// Transforms points from the velodyne to the rectified camera: `R_rect_00`, velo_to_cam and the offset of this camera
+    /// from camera 0 in `P_rect`. `None` without calib_velo_to_cam.txt.
     pub cam_from_velo: Option<Se3>,
-    /// An IMU point in the rectified camera. `None` without calib_velo_to_cam.txt or calib_imu_to_velo.txt.
+    /// Transforms points from the IMU to the rectified camera. `None` without calib_velo_to_cam.txt or calib_imu_to_velo.txt.
     pub cam_from_imu: Option<Se3>,
-    /// The product P_rect · R_rect_00 · cam0_from_velo (3×4, homogeneous pixels and camera z from a
-    /// velodyne point), from the matrices as printed. [`Se3`] projects a rotation onto the nearest
-    /// orthonormal one; ground truth that must agree with the field's to the pixel cannot.
+    /// The product P_rect · R_rect_00 · cam0_from_velo (3×4, from a velodyne point to homogeneous pixels and camera z),
+    /// from the matrices as printed. It is needed for ground truth that agrees with the published one to the pixel, since [`Se3`]
+    /// projects a rotation onto the nearest orthonormal one.
     pub pixels_from_velo: Option<Matrix3x4<f64>>,
-    /// The folder the files were read from.
+    /// Path of the folder from which the files were read.
     pub folder: PathBuf,
 }
 
 impl Calibration {
-    /// File of the cameras' intrinsics and rectification.
+    /// Name of the file with the cameras' intrinsics and rectification.
     pub const CAM_TO_CAM: &str = "calib_cam_to_cam.txt";
-    /// File of the velodyne's place.
+    /// Name of the file with the velodyne's mount.
     pub const VELO_TO_CAM: &str = "calib_velo_to_cam.txt";
-    /// File of the IMU's place.
+    /// Name of the file with the IMU's mount.
     pub const IMU_TO_VELO: &str = "calib_imu_to_velo.txt";
 
     /// Reads the calibration files of the date folder `folder` for one camera.
     ///
     /// # Errors
-    /// [`Error::Missing`] without calib_cam_to_cam.txt (the other two may be absent),
-    /// [`Error::Calibration`] where a field is absent, is not numbers or makes no camera.
+    /// [`Error::Missing`] without calib_cam_to_cam.txt (the other two may be missing),
+    /// [`Error::Calibration`] if a field is missing, not numeric or implausible.
     pub fn read(folder: &Path, camera: Camera) -> Result<Self> {
         let cameras = Fields::read(&folder.join(Self::CAM_TO_CAM))?
             .ok_or_else(|| missing(folder, Self::CAM_TO_CAM, MissingPart::Intrinsics))?;
@@ -83,7 +83,7 @@ impl Calibration {
         Ok(calibration)
     }
 
-    /// [`Self::cam_from_imu`], or an error that names the file it lacks.
+    /// [`Self::cam_from_imu`], or an error that names the missing file.
     ///
     /// # Errors
     /// [`Error::Missing`].
@@ -97,7 +97,7 @@ impl Calibration {
         })
     }
 
-    /// [`Self::pixels_from_velo`], or an error that names the file it lacks.
+    /// [`Self::pixels_from_velo`], or an error that names the missing file.
     ///
     /// # Errors
     /// [`Error::Missing`].

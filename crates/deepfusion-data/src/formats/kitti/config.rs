@@ -1,11 +1,11 @@
-//! `dataset.toml` of a KITTI drive: what of its clock and its speeds is known better than its files say, what was not measured or is not known, and whether it is simulated.
+//! `dataset.toml` of a KITTI drive: corrections of its clock and speeds, which of its values are unknown, and whether it is simulated.
 
 use crate::dataset_toml::{Clock, FolderConfig, check_clock_and_scale, read_or_default};
 use crate::{Error, OpenOptions, Result};
 use serde::Deserialize;
 use std::path::Path;
 
-/// The keys that mean something beside KITTI's own files; any other is an error.
+/// The keys allowed beside KITTI's own files; any other is an error.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Keys {
@@ -17,44 +17,45 @@ struct Keys {
     mount_known: Option<bool>,
 }
 
-/// The cameras' clock.
+/// The table `[clock]`.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Ahead {
-    /// How far it is ahead of the oxts', in seconds.
+    /// How far the cameras' clock is ahead of the oxts', in seconds.
     camera_ahead_s: Option<f64>,
 }
 
-/// The vehicle's speed.
+/// The table `[vehicle]`.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Speed {
-    /// True speed over the vehicle's.
+    /// True speed / measured speed.
     speed_scale: Option<f64>,
 }
 
-/// A drive's clock and scale of speed, and what of its oxts was measured.
+/// A drive's clock offset and speed scale, and which of its values are known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct DriveConfig {
     /// How far the cameras' clock is ahead of the oxts', in seconds.
     pub(super) camera_ahead_s: f64,
-    /// True speed over the oxts'.
+    /// True speed / speed in the oxts.
     pub(super) speed_scale: f64,
-    /// Whether the oxts' yaw rates were measured: another layout's drive may have had none.
+    /// Whether the oxts' yaw rates were measured; a drive converted from another layout may have none.
     pub(super) yaw_known: bool,
-    /// Whether its roll and pitch were.
+    /// Whether the oxts' roll and pitch were measured.
     pub(super) tilt_known: bool,
-    /// Whether its calibration says where the camera is: another layout's drive may have said nothing of it.
+    /// Whether the camera's mount in the calibration is known; a drive converted from another layout may have none.
     pub(super) mount_known: bool,
 }
 
-/// Whether the drive in a folder is simulated, as `dataset.toml` of that folder or else of its date's says. Files that cannot be read say nothing.
+/// Whether the drive in a folder is simulated, according to `dataset.toml` in that folder, otherwise in its date's. `None` if neither sets
+/// it or can be read.
 pub(super) fn says_simulated(drive: &Path) -> Option<bool> {
     Keys::of(drive).ok()?.simulated
 }
 
 impl Keys {
-    /// Each as `dataset.toml` in the drive's folder has it, else as the one in its date's.
+    /// Each key from `dataset.toml` in the drive's folder, otherwise from the one in its date's folder.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
@@ -76,7 +77,7 @@ impl Keys {
         })
     }
 
-    /// Those of one folder; without a file none.
+    /// The keys of one folder's file; none without a file.
     fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(FolderConfig::NAME);
         let keys: Self = read_or_default(&path)?;
@@ -90,7 +91,7 @@ impl Keys {
 }
 
 impl DriveConfig {
-    /// What the files of the drive and of its date say; without one nothing is said. What the options give goes before them.
+    /// The settings from the files of the drive and of its date, if any; the options take precedence.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].

@@ -1,4 +1,4 @@
-//! The `name: values` lines of KITTI's calibration files.
+//! Reads the `name: values` lines of KITTI's calibration files.
 
 use crate::formats::shared::poses::{is_rotation, motion_of_rows};
 use crate::{CalibrationProblem, Error, Result};
@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Matrix3x4, Vector3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Where rectified camera 0 lies for a camera, by its projection P = K [I | t]: t = K⁻¹ p₄.
+/// The transform from rectified camera 0 to a camera, from its projection P = K [I | t]: t = K⁻¹ p₄.
 pub(crate) fn cam_from_cam0(intrinsics: &Intrinsics, projection: &Matrix3x4<f64>) -> Se3 {
     let p4 = projection.column(3).into_owned();
     Se3::from_parts(&Matrix3::identity(), intrinsics.inverse_matrix() * p4)
@@ -20,7 +20,7 @@ pub(crate) struct Fields {
 }
 
 impl Fields {
-    /// `None` where the file does not exist.
+    /// Reads a file; `None` if it does not exist.
     pub(crate) fn read(path: &Path) -> Result<Option<Self>> {
         let bytes = match std::fs::read(path) {
             Ok(bytes) => bytes,
@@ -78,13 +78,13 @@ impl Fields {
         Ok(numbers)
     }
 
-    /// Twelve numbers that are the upper three rows of a motion, row by row.
+    /// A rigid transform from twelve numbers, the upper three rows of its matrix.
     pub(crate) fn motion(&self, field: &str) -> Result<Se3> {
         let motion = motion_of_rows(&self.numbers::<12>(field)?);
         motion.ok_or_else(|| self.error(field, CalibrationProblem::NotAMotion))
     }
 
-    /// The camera of images of a size that a projection (P = K [I | t]) has.
+    /// The intrinsics in a projection P = K [I | t], for images of this size.
     pub(crate) fn camera(
         &self,
         field: &str,
@@ -105,7 +105,7 @@ impl Fields {
         }
     }
 
-    /// A rotation, row by row, as it is printed.
+    /// A rotation, row by row, as printed.
     pub(crate) fn rotation(&self, field: &str) -> Result<Matrix3<f64>> {
         let rotation = Matrix3::from_row_slice(&self.numbers::<9>(field)?);
         if is_rotation(&rotation) {
@@ -115,7 +115,7 @@ impl Fields {
         }
     }
 
-    /// `R` and `T`, each on a line.
+    /// Rotation `R` and translation `T`, each on its own line.
     pub(crate) fn rigid(&self) -> Result<(Matrix3<f64>, Vector3<f64>)> {
         let rotation = self.rotation("R")?;
         Ok((rotation, Vector3::from(self.numbers::<3>("T")?)))

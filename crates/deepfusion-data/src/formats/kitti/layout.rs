@@ -1,4 +1,4 @@
-//! Finding drives below a path, and saying what is there where there are none.
+//! Finds drives below a path, and the drive around a path.
 
 use super::calibration::Calibration;
 use super::config::says_simulated;
@@ -11,11 +11,11 @@ use std::path::{Path, PathBuf};
 /// One drive's folders.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Drive {
-    /// The drive folder's name, such as `2011_09_26_drive_0005_sync`.
+    /// Name of the drive's folder, such as `2011_09_26_drive_0005_sync`.
     pub name: String,
-    /// The drive folder, with `image_02`, `oxts`, … in it.
+    /// Path of the drive's folder, which contains `image_02`, `oxts`, …
     pub folder: PathBuf,
-    /// Where its calibration files are: the date folder above it.
+    /// Path of the folder with its calibration files: usually the date folder above it.
     pub date_folder: PathBuf,
 }
 
@@ -23,7 +23,7 @@ impl Drive {
     fn at(folder: &Path) -> Self {
         let name = |p: &Path| p.file_name().map(|n| n.to_string_lossy().into_owned());
         let above = folder.parent().unwrap_or(folder);
-        // A drive that carries its own calibration is as good as one under its date.
+        // A drive may have its own calibration instead of that in its date folder.
         let own = folder.join(Calibration::CAM_TO_CAM).is_file();
         Self {
             name: name(folder).unwrap_or_else(|| "drive".into()),
@@ -42,7 +42,7 @@ impl Drive {
         }
     }
 
-    /// The images of `image_0<camera>`, by frame number. Empty where the camera is not there.
+    /// The images of `image_0<camera>`, with their frame numbers. Empty if there is no such camera.
     ///
     /// # Errors
     /// [`Error::File`] if a folder cannot be listed.
@@ -54,17 +54,17 @@ impl Drive {
         numbered_files(&data, &["jpeg", "jpg", "png"])
     }
 
-    /// Whether nobody drove it: `dataset.toml`, its own or else its date's, says so; where neither says anything, it has what `simulate` writes
-    /// beside its images and nobody can record, exact poses and exact masks of dynamic objects.
+    /// Whether the drive is simulated: according to its own `dataset.toml`, otherwise its date's; if neither sets it, the drive is
+    /// simulated if it has the exact poses and the exact masks of dynamic objects that only `simulate` can write.
     #[must_use]
     pub fn is_simulated(&self) -> bool {
-        /// Exact poses.
+        /// Name of the file with exact poses.
         const POSES: &str = "poses.txt";
         let has = |part: &str| self.folder.join(part).exists();
         says_simulated(&self.folder).unwrap_or_else(|| has(POSES) && has(MASKS))
     }
 
-    /// The velodyne scan of a frame, where there is one.
+    /// Path of a frame's velodyne scan, if it exists.
     #[must_use]
     pub fn scan(&self, frame: u64) -> Option<PathBuf> {
         let data = self.folder.join("velodyne_points/data");
@@ -73,13 +73,13 @@ impl Drive {
     }
 }
 
-/// The drives at `path`: the drive itself, those of a date folder, or those of all dates in a root;
-/// in order of their names. None where there is no drive.
+/// The drives at `path`: the drive itself, those of a date folder, or those of all dates in a root,
+/// ordered by name. Empty if there is no drive.
 ///
 /// # Errors
 /// [`Error::File`].
 pub fn find_drives(path: &Path) -> Result<Vec<Drive>> {
-    // `.` and links have names too once they are resolved: the drive's and the date's are needed.
+    // Resolve `.` and links, since the names of the drive and the date are needed.
     let root = path.canonicalize().map_err(|e| Error::file(path, e))?;
     if !root.is_dir() {
         return Ok(Vec::new());
@@ -102,7 +102,7 @@ pub fn find_drives(path: &Path) -> Result<Vec<Drive>> {
     Ok(drives)
 }
 
-/// A drive is known by its cameras' folders, or by its other sensors' under KITTI's naming.
+/// Whether a folder is a drive: it has the folders of KITTI's cameras, or those of its other sensors.
 fn is_drive(folder: &Path) -> bool {
     ["image_02", "image_03"]
         .iter()
@@ -110,8 +110,8 @@ fn is_drive(folder: &Path) -> bool {
         || (folder.join("oxts/data").is_dir() && folder.join("velodyne_points").is_dir())
 }
 
-/// Files named by a number with one of `extensions`, by number. Where two share a number, the last of
-/// the extensions wins.
+/// Files named by a number with one of `extensions`, ordered by number. If two have the same number, the later extension
+/// wins.
 pub(crate) fn numbered_files(folder: &Path, extensions: &[&str]) -> Result<Vec<(u64, PathBuf)>> {
     let mut files: BTreeMap<u64, (usize, PathBuf)> = BTreeMap::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
@@ -120,7 +120,7 @@ pub(crate) fn numbered_files(folder: &Path, extensions: &[&str]) -> Result<Vec<(
         let (Some(stem), Some(extension)) = (text(path.file_stem()), text(path.extension())) else {
             continue;
         };
-        // Digits alone: `+5` and `._0000000005` (macOS leaves such files) are no frames.
+        // Only digits: `+5` and `._0000000005` (a file of macOS) are not frames.
         let number = stem
             .bytes()
             .all(|b| b.is_ascii_digit())
@@ -136,7 +136,7 @@ pub(crate) fn numbered_files(folder: &Path, extensions: &[&str]) -> Result<Vec<(
     Ok(files.into_iter().map(|(n, (_, path))| (n, path)).collect())
 }
 
-/// The drive that a folder lies in, if it does: giving a folder within a drive is the likeliest slip.
+/// The drive that contains a folder, if any: giving a folder within a drive is a common mistake.
 pub(crate) fn drive_around(folder: &Path) -> Option<PathBuf> {
     let around = folder.ancestors().skip(1).take(2);
     around.map(Path::to_owned).find(|p| is_drive(p))

@@ -1,5 +1,5 @@
-//! KITTI raw as it lies on disk: `<date>/<date>_drive_<n>_sync/{image_02,image_03,velodyne_points,oxts}`
-//! with the calibration files in `<date>`.
+//! Reads KITTI raw: `<date>/<date>_drive_<n>_sync/{image_02,image_03,velodyne_points,oxts}`, with the calibration
+//! files in `<date>`.
 
 mod calibration;
 mod config;

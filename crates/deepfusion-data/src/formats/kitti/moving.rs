@@ -1,4 +1,4 @@
-//! Dynamic pixels of a KITTI raw drive: by the simulator's masks, or by the tracklets and the car's own motion.
+//! Dynamic pixels of a KITTI raw drive: from the simulator's masks, or from the tracklets and the vehicle's own motion.
 
 use super::calibration::Calibration;
 use super::tracklets::{Tracklet, TrackletPose};
@@ -10,19 +10,19 @@ use nalgebra::{Matrix3x4, Vector3};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Speed over ground from which a labelled box counts as moving, in m/s. On KITTI's drive 0005 the boxes
-/// of parked cars show at most 0.6 m/s in 19 of 20 frames (the labels' own unrest), a strolling
-/// pedestrian's at least 0.9.
+/// Speed over ground from which a labelled box counts as moving, in m/s. In KITTI's drive 0005, the boxes
+/// of parked cars move at up to 0.6 m/s in 19 of 20 frames (jitter of the labels), a slow pedestrian's at 0.9 m/s
+/// or more.
 const MOVING_MPS: f64 = 0.75;
 /// Frames before and after over which that speed is measured, fewer at a tracklet's ends.
 const REACH: u64 = 5;
-/// How far beyond a box's sides a point still belongs to it, in metres: mirrors, and the half pixel
-/// that a projected point was rounded by.
+/// How far outside a box's sides a point still belongs to it, in metres: for mirrors, and the half pixel by
+/// which a projected point was rounded.
 const MARGIN_M: f64 = 0.1;
-/// Masks of the simulator's drives, one PNG a frame beside the images: 255 on dynamic objects.
+/// Folder of the masks of simulated drives, one PNG per frame: 255 on dynamic objects.
 pub(super) const MASKS: &str = "moving_02";
 
-/// A box that moves, in one frame's velodyne axes.
+/// A moving box, in one frame's velodyne axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MovingBox {
     pose: TrackletPose,
@@ -66,8 +66,8 @@ pub(super) fn labels(calibration: &Calibration, dataset: &Dataset) -> Result<Opt
     Ok(Some(MovingLabels::new(MovingSource::Tracklets, boxes)))
 }
 
-/// How fast a tracklet's box moves over the ground about a frame, in m/s; `None` where it or the
-/// car's own motion is known in that frame alone.
+/// Speed over ground of a tracklet's box around a frame, in m/s; `None` if the box or the vehicle's own motion is
+/// known only in that frame.
 fn speed_over_ground(
     dataset: &Dataset,
     tracklet: &Tracklet,
@@ -84,11 +84,11 @@ fn speed_over_ground(
         .vehicle0_from_vehicle1();
     let in_imu = |frame| Some(imu_from_velo.transform(&tracklet.pose(frame)?.bottom_m));
     let moved = imu0_from_imu1.transform(&in_imu(to)?) - in_imu(from)?;
-    // Over the ground: the boxes' heights follow the road.
+    // Horizontally only: the boxes' heights follow the road.
     Some(moved.xy().norm() / (to_s - from_s))
 }
 
-/// The folder of the simulator's masks.
+/// Path of the folder of the simulator's masks.
 #[derive(Debug)]
 struct Masks(PathBuf);
 
@@ -111,7 +111,7 @@ impl MovingPixels for Masks {
     }
 }
 
-/// Moving boxes by frame.
+/// Moving boxes by frame number.
 #[derive(Debug)]
 struct Boxes {
     pixels_from_velo: Matrix3x4<f64>,
@@ -133,8 +133,8 @@ impl MovingPixels for Boxes {
 }
 
 impl MovingBox {
-    /// Whether a point (velodyne axes, metres) lies inside, or beside it by less than the margin. Nothing
-    /// below its bottom: that is the road.
+    /// Whether a point (velodyne axes, metres) is inside the box or within the margin of its sides. There is no margin
+    /// below its bottom, since that is the road.
     fn holds(&self, point: &Vector3<f64>) -> bool {
         let from_centre = point - self.pose.bottom_m;
         let (sin, cos) = self.pose.yaw_rad.sin_cos();

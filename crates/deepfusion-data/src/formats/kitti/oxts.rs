@@ -1,4 +1,4 @@
-//! OXTS: one file a packet of the car's GPS / IMU, thirty numbers.
+//! Reads OXTS: one file with thirty numbers for each packet of the vehicle's GPS / IMU.
 
 use super::timestamps::TimeStamps;
 use crate::{Error, MissingPart, OxtsField, OxtsProblem, Result, VehicleTrack};
@@ -15,7 +15,7 @@ const VF: usize = 8;
 const AX: usize = 11;
 const WX: usize = 17;
 
-/// What this program uses of a packet. Vehicle axes: x forward, y left, z up, at the IMU.
+/// The values of a packet that this program uses. Vehicle axes: x forward, y left, z up, at the IMU.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OxtsPacket {
     /// Roll, pitch, yaw (heading, 0 = east, counter-clockwise), in radians.
@@ -32,7 +32,7 @@ impl OxtsPacket {
     /// Reads one packet's file.
     ///
     /// # Errors
-    /// [`Error::Oxts`] with the file and the field where there are not 30 values, or one of them is no
+    /// [`Error::Oxts`] with the file and the field if there are not 30 values, or one of them is not a
     /// finite number.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
@@ -74,9 +74,9 @@ impl OxtsPacket {
     }
 }
 
-/// Reads the packets of an `oxts` folder as a track of forward speed (`vf`), yaw rate (`wz`), roll and pitch over
-/// seconds from `origin_ns`. Packets that are not there leave a gap. Where every packet is level to the last digit and rates (`wx`, `wy`) are given, as
-/// in copies of drives whose vehicle says its rates alone, the track has these.
+/// Reads the packets of an `oxts` folder as a track of forward speed (`vf`), yaw rate (`wz`), roll and pitch over time in
+/// seconds from `origin_ns`. Missing packets leave a gap. If all packets have exactly zero roll and pitch but non-zero rates (`wx`, `wy`),
+/// as in converted drives whose vehicle only measured rates, the track has the rates instead.
 ///
 /// # Errors
 /// [`Error::Missing`] without the folder, its time stamps or any packet; [`Error::TimeStamp`],
@@ -100,10 +100,10 @@ pub fn read_oxts(folder: &Path, origin_ns: i64) -> Result<VehicleTrack> {
     Ok(track.with_tilt(&packets.iter().map(tilt).collect::<Vec<_>>()))
 }
 
-/// The packets of an `oxts` folder with their times in seconds from `origin_ns`, by number.
+/// The packets of an `oxts` folder with their times in seconds from `origin_ns`, ordered by number.
 ///
 /// # Errors
-/// As [`read_oxts`].
+/// Those of [`read_oxts`].
 pub(crate) fn read_packets(folder: &Path, origin_ns: i64) -> Result<Vec<(f64, OxtsPacket)>> {
     let data = folder.join("data");
     let missing = || Error::Missing {

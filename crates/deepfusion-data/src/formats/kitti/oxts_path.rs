@@ -1,4 +1,4 @@
-//! The camera's path as the car's GPS / IMU unit knows it.
+//! The camera's path according to the vehicle's GPS / IMU unit.
 
 use super::calibration::Calibration;
 use super::oxts::{OxtsPacket, read_packets};
@@ -6,12 +6,12 @@ use crate::{CameraPath, Dataset, Result};
 use deepfusion_geometry::Se3;
 use nalgebra::{Rotation3, Vector3};
 
-/// The camera's path from OXTS: the unit's attitude as it says, and its place as the integral of its
-/// velocity (`vf`, `vl`, `vu`, turned by the heading; trapezoidal rule). Not its GPS fix, which jumps
-/// by decimetres between houses; a velocity's error adds up instead, to some per mille of the way.
+/// The camera's path from OXTS: the unit's measured attitude, and its position as the integral of its
+/// velocity (`vf`, `vl`, `vu`, rotated by the heading; trapezoidal rule). The GPS position is not used, since it jumps
+/// by decimetres between houses. The velocity's error accumulates to a few per mille of the distance instead.
 ///
-/// Stretches in which frames are missing, times do not rise, or the packets leave a gap of more than
-/// half a second are cut there.
+/// The path is cut where frames are missing, times do not increase, or the packets have a gap of more than
+/// half a second.
 ///
 /// # Errors
 /// [`crate::Error::Missing`] without time stamps, oxts or the IMU's calibration;
@@ -21,9 +21,9 @@ pub(super) fn oxts_paths(
     calibration: &Calibration,
     speed_scale: f64,
 ) -> Result<Vec<CameraPath>> {
-    // Names what is missing, if something is.
+    // Returns an error that names what is missing, if anything.
     dataset.ego()?;
-    // Where nothing says how the camera looks it may have been aimed since.
+    // An assumed viewing direction may have been corrected from the images since.
     let cam_from_imu = calibration.require_cam_from_imu()?;
     let imu_from_cam = dataset.cam_from_vehicle().unwrap_or(cam_from_imu).inverse();
     let origin_ns = dataset.origin_ns().unwrap_or_default();
@@ -63,11 +63,11 @@ pub(super) fn oxts_paths(
     Ok(paths)
 }
 
-/// Where the unit is at each packet's time.
+/// The unit's pose at each packet's time.
 struct UnitPath {
     time_s: Vec<f64>,
     world_from_imu: Vec<Se3>,
-    /// Over the ground, in the world's axes, in m/s.
+    /// Velocity over ground, in world axes, in m/s.
     velocity_mps: Vec<Vector3<f64>>,
 }
 
@@ -81,7 +81,7 @@ impl UnitPath {
         let mut place = Vector3::zeros();
         for (time_s, packet) in packets {
             let [roll, pitch, yaw] = packet.attitude_rad;
-            // vf, vl, vu lie along the ground: only the heading turns them into the world.
+            // vf, vl, vu are parallel to the ground, so only the heading rotates them into the world.
             let heading = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw);
             let velocity = heading * Vector3::from(packet.velocity_mps);
             if let (Some(last_s), Some(before)) = (path.time_s.last(), path.velocity_mps.last()) {
@@ -99,8 +99,8 @@ impl UnitPath {
         path
     }
 
-    /// `world_from_imu`, between its neighbours; beyond the ends, where the clocks of camera and unit
-    /// differ by some milliseconds, it goes on as it went.
+    /// `world_from_imu`, interpolated; extrapolated beyond the ends, since the clocks of camera and unit differ by some
+    /// milliseconds.
     fn at(&self, time_s: f64) -> Option<Se3> {
         let after = self.time_s.partition_point(|t| *t < time_s);
         if after == 0 || after == self.time_s.len() {

@@ -21,7 +21,7 @@ use image::RgbImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Exact depth of the simulator's drives and KITTI's annotated depth, one 16-bit PNG a frame, of each camera.
+/// Folder of the exact depth of simulated drives and of KITTI's annotated depth, one 16-bit PNG per frame and camera.
 const DEPTHS: &str = "proj_depth/groundtruth";
 
 /// One camera of one drive.
@@ -30,9 +30,9 @@ struct KittiRecording {
     drive: Drive,
     calibration: Calibration,
     camera: Camera,
-    /// True speed over the oxts', which the track holds already.
+    /// True speed / speed in the oxts; already applied to the track.
     speed_scale: f64,
-    /// Seconds by frame number, also of frames without an image.
+    /// Times in seconds by frame number, also for frames without an image.
     times_s: Vec<Option<f64>>,
     warnings: Vec<DataWarning>,
 }
@@ -79,8 +79,8 @@ fn open_drive(
     let calibration = Calibration::read(&drive.date_folder, camera)?;
     let folder = drive.folder.join(format!("image_0{}", camera.number()));
     let times = optional(TimeStamps::read(&folder.join("timestamps.txt")))?;
-    // Both clocks count from the camera's first line, so that seconds keep their nanoseconds: the camera's own from its
-    // first stamp, the oxts' from what that stamp is on their clock.
+    // Both clocks count from the camera's first time stamp, so that seconds keep nanosecond precision: the camera's from that
+    // stamp, the oxts' from the same moment on their clock.
     let camera_origin_ns = times.as_ref().and_then(TimeStamps::origin_ns);
     let origin_ns = camera_origin_ns.map(|ns| on_the_vehicles_clock(ns, config.camera_ahead_s));
     let track = match origin_ns {
@@ -149,7 +149,7 @@ fn open_drive(
 }
 
 impl KittiRecording {
-    /// The depth image of a frame, where there is one.
+    /// Path of a frame's depth image, if it exists.
     fn depth_image(&self, frame: &Frame) -> Option<PathBuf> {
         let name = format!(
             "{DEPTHS}/image_0{}/{:010}.png",
@@ -160,7 +160,7 @@ impl KittiRecording {
         path.is_file().then_some(path)
     }
 
-    /// What it holds; `what` it is in errors.
+    /// The depth image of a frame; errors call it `what`.
     fn read_depth(&self, frame: &Frame, what: &'static str) -> Result<Option<DepthMap>> {
         let Some(path) = self.depth_image(frame) else {
             return Ok(None);
@@ -229,7 +229,7 @@ impl Recording for KittiRecording {
         Ok(streams)
     }
 
-    /// Reading again gives the error that names the file.
+    /// Reads the files again to get the error that names the missing one.
     fn no_motion(&self) -> Error {
         let folder = &self.drive.folder;
         if self.times_s.iter().all(Option::is_none) {
@@ -271,8 +271,8 @@ impl Recording for KittiRecording {
     }
 
     fn has_dense_depth(&self, frame: &Frame) -> bool {
-        // Only the simulator's masks tell its drives from KITTI's own, whose annotated depth may lie in the same place: there 0
-        // is a pixel that no scan has met, here the sky.
+        // KITTI's annotated depth may be in the same folder, and only the simulator's masks distinguish the two: in KITTI's, 0 is a
+        // pixel without a measurement, in the simulator's it is the sky.
         self.camera.number() == 2
             && self.drive.folder.join(MASKS).is_dir()
             && self.depth_image(frame).is_some()
@@ -303,7 +303,7 @@ impl Recording for KittiRecording {
     }
 }
 
-/// A part that may be absent, but not broken.
+/// An optional part: `None` if it is missing, but an error if it is invalid.
 pub(crate) fn optional<T>(part: Result<T>) -> Result<Option<T>> {
     match part {
         Ok(part) => Ok(Some(part)),

@@ -1,4 +1,4 @@
-//! `timestamps.txt`: one line a frame of the whole drive, whether or not the frame is there.
+//! Reads `timestamps.txt`: one line for each frame of the whole drive, whether or not its image exists.
 
 use crate::logs::date_time::parse;
 use crate::{Error, MissingPart, Result};
@@ -7,18 +7,18 @@ use std::path::{Path, PathBuf};
 /// Time stamps of a sensor, by frame number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeStamps {
-    /// Nanoseconds since 1970-01-01 00:00; a frame's number is its index. Integers, because an f64 of
-    /// seconds since 1970 resolves only a quarter of a microsecond. `None` where the line is empty:
-    /// KITTI writes that for frames the sensor missed (drive 0009's scans 177 to 180).
+    /// Nanoseconds since 1970-01-01 00:00, indexed by frame number. Integers, because an f64 of
+    /// seconds since 1970 only has a resolution of a quarter of a microsecond. `None` for an empty line,
+    /// which KITTI writes for frames that the sensor missed (drive 0009's scans 177 to 180).
     pub ns: Vec<Option<i64>>,
-    /// Empty lines behind the last time: of frames without a time, if those frames are there at all.
+    /// Number of empty lines after the last time, which stand for frames without a time if such frames exist.
     empty_at_end: usize,
     path: PathBuf,
 }
 
 impl TimeStamps {
-    /// Reads a file of lines like `2011-09-26 13:04:32.345808896`, or empty for a frame without a time.
-    /// Empty lines at its end count where a frame asks for them.
+    /// Reads a file of lines like `2011-09-26 13:04:32.345808896`, or empty lines for frames without a time.
+    /// Empty lines at the end only count if there are such frames.
     ///
     /// # Errors
     /// [`Error::Missing`] if there is no such file, [`Error::TimeStamp`] with the number of a bad line.
@@ -53,13 +53,13 @@ impl TimeStamps {
         })
     }
 
-    /// The first time there is, from which seconds are counted.
+    /// The first time in the file, from which seconds are counted.
     #[must_use]
     pub fn origin_ns(&self) -> Option<i64> {
         self.ns.iter().copied().flatten().next()
     }
 
-    /// Seconds from `origin_ns` to the time of `frame`; `None` where its line is empty.
+    /// Seconds from `origin_ns` to the time of `frame`; `None` if its line is empty.
     ///
     /// # Errors
     /// [`Error::NoTimeStamp`] if the file ends before that frame.
@@ -68,7 +68,7 @@ impl TimeStamps {
         Ok(ns.map(|ns| (ns - origin_ns) as f64 * 1e-9))
     }
 
-    /// The time of `frame`, in nanoseconds since 1970; `None` where its line is empty.
+    /// The time of `frame`, in nanoseconds since 1970; `None` if its line is empty.
     ///
     /// # Errors
     /// [`Error::NoTimeStamp`] if the file ends before that frame.

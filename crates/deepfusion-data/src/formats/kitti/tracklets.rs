@@ -1,4 +1,4 @@
-//! `tracklet_labels.xml`: boxes around traffic, followed over a drive's frames.
+//! Reads `tracklet_labels.xml`: boxes around traffic, tracked over a drive's frames.
 
 use crate::{Error, MissingPart, TrackletPart, TrackletPlace, TrackletsProblem};
 use nalgebra::Vector3;
@@ -7,20 +7,20 @@ use quick_xml::events::Event;
 use std::io::BufRead;
 use std::path::Path;
 
-/// A labelled object: a box of one size with a place in each of some consecutive frames.
+/// A labelled object: a box of constant size with a pose in each of several consecutive frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracklet {
-    /// What it is, in KITTI's words: `Car`, `Van`, `Pedestrian`, `Cyclist`, …
+    /// KITTI's name for its class: `Car`, `Van`, `Pedestrian`, `Cyclist`, …
     pub object: String,
     /// Length, width and height, in metres.
     pub size_m: [f64; 3],
     /// Number of the frame that its first pose belongs to.
     pub first_frame: u64,
-    /// Its places, one a frame.
+    /// Its poses, one per frame.
     pub poses: Vec<TrackletPose>,
 }
 
-/// Where a box stands in one frame, in the velodyne's axes (x forward, y left, z up).
+/// Pose of a box in one frame, in the velodyne's axes (x forward, y left, z up).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackletPose {
     /// Centre of the box's bottom, in metres.
@@ -30,21 +30,21 @@ pub struct TrackletPose {
 }
 
 impl Tracklet {
-    /// The file's name in a drive's folder.
+    /// Name of the file in a drive's folder.
     pub const FILE: &str = "tracklet_labels.xml";
 
-    /// Its place in a frame; `None` where it was not seen.
+    /// The object's pose in a frame; `None` if it has none there.
     #[must_use]
     pub fn pose(&self, frame: u64) -> Option<TrackletPose> {
         let index = usize::try_from(frame.checked_sub(self.first_frame)?).ok()?;
         self.poses.get(index).copied()
     }
 
-    /// Reads a file of tracklets, element by element.
+    /// Reads a tracklet file, element by element.
     ///
     /// # Errors
-    /// [`Error::Missing`] if there is no such file; [`Error::Tracklets`] naming the tracklet, pose and
-    /// field where the text is no XML, ends early, lacks a number or has fewer entries than it says.
+    /// [`Error::Missing`] if there is no such file; [`Error::Tracklets`] with the tracklet, pose and
+    /// field if the text is not XML, is truncated, lacks a number or has fewer entries than its count.
     pub fn read(path: &Path) -> crate::Result<Vec<Self>> {
         let file = std::fs::File::open(path).map_err(|e| match e.kind() {
             std::io::ErrorKind::NotFound => Error::Missing {
@@ -78,12 +78,12 @@ impl Tracklet {
     }
 }
 
-/// What was read so far, and the element that is being read.
+/// The tracklets read so far, and the element being read.
 #[derive(Default)]
 struct Document {
-    /// Names of the open elements, the outermost first.
+    /// Names of the open elements, from the outermost to the innermost.
     path: Vec<String>,
-    /// Text of the innermost.
+    /// Text of the innermost element.
     text: String,
     tracklets: Vec<Tracklet>,
     announced: Option<usize>,
@@ -91,7 +91,7 @@ struct Document {
     pose: OpenPose,
 }
 
-/// A tracklet whose end has not come yet.
+/// A tracklet being read.
 #[derive(Default)]
 struct OpenTracklet {
     object: Option<String>,
@@ -103,7 +103,7 @@ struct OpenTracklet {
     poses: Vec<TrackletPose>,
 }
 
-/// A pose whose end has not come yet.
+/// A pose being read.
 #[derive(Default)]
 struct OpenPose {
     tx: Option<f64>,
@@ -142,7 +142,7 @@ impl Document {
         outcome
     }
 
-    /// Where the document stands.
+    /// The current place in the document.
     fn place(&self, path: &[&str]) -> TrackletPlace {
         let name = path.last().filter(|name| **name != "item");
         let field = name.map(|&name| name.to_owned());
@@ -245,7 +245,7 @@ fn length(text: &str) -> Result<f64, TrackletsProblem> {
     }
 }
 
-/// As much of a text as belongs into a message.
+/// A text, shortened for a message.
 fn shown(text: &str) -> String {
     text.trim().chars().take(40).collect()
 }
@@ -313,7 +313,7 @@ mod tests {
         assert_eq!(pose.yaw_rad, 0.54);
     }
 
-    /// A whole file's text up to the first `mark`.
+    /// The text of a complete file up to the first `mark`.
     fn cut_at(mark: &str) -> String {
         let whole = file(POSE, 1);
         whole[..whole.find(mark).unwrap()].to_owned()
@@ -330,9 +330,9 @@ mod tests {
             (
                 file(&POSE.replace("<tz>-1.74</tz>", ""), 1),
                 "tracklet 0, pose 0",
-                "has no <tz>",
+                "no <tz>",
             ),
-            (file(POSE, 3), "tracklet 0", "1 pose, its count says 3"),
+            (file(POSE, 3), "tracklet 0", "1 pose, but <count> is 3"),
             (
                 file(POSE, 1).replace("<l>4.5</l>", "<l>-4.5</l>"),
                 "tracklet 0, l",
@@ -341,12 +341,12 @@ mod tests {
             (
                 file(POSE, 1).replacen("<count>1</count>", "<count>2</count>", 1),
                 "byte",
-                "1 tracklet, its count says 2",
+                "1 tracklet, but <count> is 2",
             ),
             (file(POSE, 1).replace("</tx>", "</ty>"), "byte", "tx"),
             (cut_at("</item>"), "byte", "ends within"),
             (cut_at("tem>"), "byte", "not closed"),
-            ("<html></html>".to_owned(), "byte", "holds no tracklets"),
+            ("<html></html>".to_owned(), "byte", "not a tracklet file"),
         ];
         for (text, place, problem) in cases {
             let error = parse(&text).unwrap_err();

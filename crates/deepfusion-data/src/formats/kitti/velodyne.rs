@@ -1,16 +1,16 @@
-//! Sparse ground-truth depth from a velodyne scan.
+//! Computes sparse ground-truth depth from a velodyne scan.
 
 use crate::truth::GtKind;
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
 use nalgebra::{Matrix3, Matrix3x4, Vector3, Vector4};
 
-/// The scan as a sparse depth map of `width` × `height` pixels, metres, 0 = none.
+/// The scan as a sparse depth map of `width` × `height` pixels, metres, 0 = no depth.
 ///
 /// `pixels_from_velo` is the 3×4 projection of a point (x forward, y left, z up, metres) to homogeneous
 /// pixels. Points behind the sensor (x < 0) are left out, pixels are rounded with halves to even, and
-/// the nearest point wins a pixel. With [`GtKind::Velodyne`] points before the sensor yet behind the
-/// camera (0 ≤ x < 0.3 m, none in practice) are projected too, as the field's files have it.
+/// the nearest point wins a pixel. With [`GtKind::Velodyne`], points in front of the sensor but behind the
+/// camera (0 ≤ x < 0.3 m, none in practice) are projected too, as in the published files.
 #[must_use]
 pub fn depth_map(
     scan: &PointCloud,
@@ -43,7 +43,7 @@ pub fn depth_map(
 }
 
 /// The point (x forward, y left, z up, metres) that [`depth_map`] put at a pixel (column, row) with this
-/// depth, up to the half pixel that was rounded away; `None` where the projection has no inverse.
+/// depth, up to rounding by half a pixel; `None` if the projection has no inverse.
 #[must_use]
 pub fn velo_point(
     pixels_from_velo: &Matrix3x4<f64>,
@@ -78,7 +78,7 @@ fn column_of(matrix: &Matrix3x4<f64>, i: usize) -> Vector3<f64> {
 mod tests {
     use super::*;
 
-    /// Both kinds of ground truth lead back to the point they were made from, to the rounded pixel.
+    /// Both kinds of ground truth give back the original point, up to the rounding to pixels.
     #[test]
     fn a_pixel_leads_back_to_its_point() {
         // Camera axes from the velodyne's, 0.27 m behind the camera's plane, KITTI's focal length.

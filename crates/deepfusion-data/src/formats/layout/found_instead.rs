@@ -1,4 +1,4 @@
-//! Finds out what lies at a path where no recording of a known layout is.
+//! Finds out what is at a path without a recording of a known layout.
 
 use crate::formats::shared::files::folders;
 use crate::{Error, FileKind, FoundInstead, Result};
@@ -7,7 +7,7 @@ use deepfusion_video::is_video;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A file that is no recording.
+/// Describes a file that is not a recording.
 pub(super) fn file(path: &Path) -> FoundInstead {
     match kind_of(path) {
         Some(FileKind::Ros2Bags) => FoundInstead::Ros2Bag,
@@ -17,7 +17,7 @@ pub(super) fn file(path: &Path) -> FoundInstead {
     }
 }
 
-/// A folder without a recording; it is read, and those in it, without what is hidden.
+/// Describes a folder without a recording, from the names of its files and those in its folders, except hidden ones.
 ///
 /// # Errors
 /// [`Error::File`].
@@ -54,7 +54,7 @@ pub(super) fn folder(folder: &Path) -> Result<FoundInstead> {
     })
 }
 
-/// The kind of a file, by its ending.
+/// The kind of a file, by its extension.
 fn kind_of(path: &Path) -> Option<FileKind> {
     if is_image(path) {
         return Some(FileKind::Images);

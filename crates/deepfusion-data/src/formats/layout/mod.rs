@@ -1,4 +1,4 @@
-//! Telling layouts apart.
+//! Recognises layouts.
 
 mod found_instead;
 mod neighbours;
@@ -19,19 +19,20 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl Dataset {
-    /// Opens a recording of any known layout, recognised by what is there. A KITTI raw drive, date or root gives one data set for
+    /// Opens a recording of any known layout, which is recognised by its files. A KITTI raw drive, date or root gives one data set for
     /// each drive and camera, in order of names; KITTI odometry one for each sequence, KITTI-360 one for each drive, nuScenes one for
     /// each scene. A bag, a folder of images, a video file, a comma2k19 segment and a folder of RGB-D frames give one. A folder of such recordings whose
-    /// `dataset.toml` says `for_folders = true` gives those of each. Drives without images of the camera, or without a selected frame, are left out.
+    /// `dataset.toml` has `for_folders = true` gives those of each. Drives without images of the camera, or without a selected frame, are
+    /// left out.
     ///
-    /// The sizes of all images are checked against the calibration. Times and speeds may be absent
-    /// (evaluation needs neither); where they are there, they must be readable. What looks like another recording in the folder and is not
-    /// read with this one stands among the [warnings](Self::warnings) of the first ([`Self::passed_over`]).
+    /// The sizes of all images are checked against the calibration. Times and speeds may be missing
+    /// (evaluation needs neither), but must be readable if they exist. If something else in the folder looks like a recording, the
+    /// first data set has a [warning](Self::warnings) about it ([`Self::passed_over`]).
     ///
     /// # Errors
-    /// [`Error::UnknownLayout`] where no layout fits, [`Error::FolderOfRecordings`], [`Error::File`], [`Error::Missing`]
+    /// [`Error::UnknownLayout`] if no layout fits, [`Error::FolderOfRecordings`], [`Error::File`], [`Error::Missing`]
     /// (calibration), [`Error::NoImages`], [`Error::OneCamera`], [`Error::FrameSize`], [`Error::Image`],
-    /// [`Error::SplitSelectsNothing`], and what the layout's files can have wrong:
+    /// [`Error::SplitSelectsNothing`], and errors in the layout's files:
     /// [`Error::Calibration`], [`Error::TimeStamp`], [`Error::NoTimeStamp`], [`Error::Oxts`],
     /// [`Error::Table`], [`Error::Config`], [`Error::Clocks`], [`Error::Video`], [`Error::Topic`],
     /// [`Error::Frames`], [`Error::NoTopics`], [`Error::Pose`], [`Error::Json`],
@@ -40,7 +41,7 @@ impl Dataset {
         Layout::of(path)?.open_warning(path, options)
     }
 
-    /// The layout in which [`Self::open`] reads what is at a path, found without opening it.
+    /// The layout as which [`Self::open`] would read a path, found without opening it.
     ///
     /// # Errors
     /// [`Error::UnknownLayout`], [`Error::FolderOfRecordings`], [`Error::File`], [`Error::Config`], [`Error::SeveralVersions`].
@@ -49,24 +50,24 @@ impl Dataset {
     }
 
     /// Whether every recording at a path is marked as simulated by the files beside its images ([`Self::is_simulated`]), found without opening
-    /// any; of a bag by its own file alone. `false` also where nothing can be opened.
+    /// it; for a bag, only the file beside it counts. `false` if there is no recording.
     #[must_use]
     pub fn all_simulated_at(path: &Path) -> bool {
         Layout::of(path).is_ok_and(|layout| layout.says_simulated())
     }
 
-    /// A recording of messages, such as an open bag of another format, as [`Self::open`] opens a bag: topics are found
-    /// by type, and the file beside [`MessageSource::path`] says what they do not.
+    /// Opens a recording of messages, such as a bag in another format, like [`Self::open`] opens a bag: topics are found
+    /// by type, and the file beside [`MessageSource::path`] adds settings.
     ///
     /// # Errors
-    /// As [`Self::open`].
+    /// Those of [`Self::open`].
     pub fn from_messages(source: Arc<dyn MessageSource>, options: &OpenOptions) -> Result<Self> {
         let path = source.path().to_owned();
         bag::open_bag(source, options)?.select(&path, options)
     }
 }
 
-/// What lies at a path.
+/// The recording at a path.
 #[derive(Debug)]
 pub(crate) enum Layout {
     Kitti(Vec<Drive>),
@@ -78,7 +79,7 @@ pub(crate) enum Layout {
     Bags(Vec<PathBuf>),
     Folder(PathBuf),
     Video(PathBuf),
-    /// Those of the folders in a folder whose settings are for them.
+    /// The recordings in the subfolders of a folder whose settings apply to them.
     Several(Vec<(PathBuf, Layout)>),
 }
 
@@ -94,9 +95,9 @@ impl Layout {
         let mut recordings = folders(path)?;
         if FolderConfig::read_for_folders(path)?.is_some() {
             let mut found = Vec::new();
-            // Predictions and decoded frames are images, too.
+            // Skip predictions and decoded frames, which are images too.
             for folder in recordings.iter().filter(|folder| !holds_outputs(folder)) {
-                // One that is broken is not left out silently.
+                // An invalid recording is an error, not silently left out.
                 found.extend(Self::known(folder)?.map(|layout| (folder.clone(), layout)));
             }
             if !found.is_empty() {
@@ -118,16 +119,16 @@ impl Layout {
         })
     }
 
-    /// The first layout that fits; `None` for a folder that none does.
+    /// The first layout that fits; `None` for a folder that fits none.
     ///
     /// # Errors
-    /// As [`Self::of`].
+    /// Those of [`Self::of`].
     fn known(path: &Path) -> Result<Option<Self>> {
         let sequences = kitti_odometry::find(path)?;
         if !sequences.is_empty() {
             return Ok(Some(Self::KittiOdometry(sequences)));
         }
-        // Its fisheye cameras 2 and 3 have the names of KITTI raw's.
+        // Before KITTI raw: KITTI-360's fisheye cameras 2 and 3 have the same names as KITTI raw's cameras.
         let drives = kitti360::find(path)?;
         if !drives.is_empty() {
             return Ok(Some(Self::Kitti360(drives)));
@@ -139,14 +140,14 @@ impl Layout {
         if !drives.is_empty() {
             return Ok(Some(Self::Kitti(drives)));
         }
-        // `.` and links have names too once they are resolved.
+        // Resolve `.` and links to get a name.
         let real = path.canonicalize().map_err(|e| Error::file(path, e))?;
         let unknown = |found| Error::UnknownLayout {
             path: path.to_owned(),
             found,
         };
         let given = named(path, &real);
-        // By either name: a link may have no ending, or lead to a store whose files have none.
+        // Check both names: the link or its target may have no extension.
         if bag::is_bag(&given) || bag::is_bag(&real) {
             return Ok(Some(Self::Bags(vec![given])));
         }
@@ -183,7 +184,7 @@ impl Layout {
         }
     }
 
-    /// Its name.
+    /// The layout's kind.
     pub(crate) fn kind(&self) -> DatasetKind {
         match self {
             Self::Kitti(_) => DatasetKind::KittiRaw,
@@ -207,7 +208,7 @@ impl Layout {
         }
     }
 
-    /// Whether the files beside the images say of each recording that it is simulated.
+    /// Whether the files beside the images mark every recording as simulated.
     fn says_simulated(&self) -> bool {
         let says = |folder: &Path| FolderConfig::read(folder).is_ok_and(|config| config.simulated);
         match self {
@@ -222,7 +223,7 @@ impl Layout {
         }
     }
 
-    /// Whether an error says of a recording no more than that it has no images: of several it is then left out.
+    /// Whether an error only means that a recording has no images, so that it is left out if there are several.
     pub(crate) fn lacks_images(&self, error: &Error) -> bool {
         match error {
             Error::NoImages { .. } => true,
@@ -231,7 +232,7 @@ impl Layout {
         }
     }
 
-    /// Topics are a bag's alone, and a camera is given where the layout has none: for another recording they would silently say nothing.
+    /// Refuses topics for recordings other than bags, and a camera for layouts with a calibration, instead of silently ignoring them.
     ///
     /// # Errors
     /// [`Error::NoTopics`], [`Error::OwnCalibration`].
@@ -256,18 +257,18 @@ impl Layout {
         Ok(())
     }
 
-    /// What else lies in the folder at a path, looks like a recording and is not read; `None` where there is nothing of the kind, and for a
-    /// file.
+    /// The warning about what else in the folder at a path looks like a recording and is not read; `None` if there is nothing, or the path
+    /// is a file.
     pub(crate) fn passed_over(&self, path: &Path) -> Option<IncompleteWarning> {
         let folder = path.canonicalize().ok()?;
-        // A bag of ROS 2 may be a folder of its files.
+        // A ROS 2 bag may be a folder of files.
         if !folder.is_dir() || [path, folder.as_path()].into_iter().any(bag::is_bag) {
             return None;
         }
         let used = self.used(&folder);
         let wanted = NeighbourSearch {
             used: &used,
-            // A folder's own, or left out by its `dataset.toml`.
+            // For these layouts a video is the recording itself, or excluded by `dataset.toml`.
             videos: !matches!(self, Self::Comma(_) | Self::Folder(_) | Self::Video(_)),
             folders: match self {
                 Self::Kitti(_) => !used.contains(&folder),
@@ -281,7 +282,7 @@ impl Layout {
         };
         let recordings = unread(&folder, wanted);
         (!recordings.is_empty()).then(|| IncompleteWarning::PassedOver {
-            // `.` and `..` name nothing.
+            // `.` and `..` are not names.
             folder: match path.file_name() {
                 Some(_) => path.to_owned(),
                 None => folder,
@@ -291,7 +292,7 @@ impl Layout {
         })
     }
 
-    /// Files and folders that are read of a recording in a folder, as far as they could be taken for other recordings.
+    /// The files and folders that are read for a recording in a folder, if they could be mistaken for other recordings.
     fn used(&self, folder: &Path) -> Vec<PathBuf> {
         match self {
             Self::Kitti(drives) => drives.iter().map(|drive| drive.folder.clone()).collect(),
@@ -306,7 +307,7 @@ impl Layout {
                 if matches!(self, Self::Folder(_)) {
                     places.extend(folder::images_folder(folder, &config).ok());
                 }
-                // Through `..` and links, too.
+                // Resolve `..` and links too.
                 let resolved = places.iter().filter_map(|place| place.canonicalize().ok());
                 let resolved: Vec<PathBuf> = resolved.collect();
                 places.extend(resolved);
@@ -316,7 +317,7 @@ impl Layout {
         }
     }
 
-    /// Each of several recordings by itself, with its file or folder. Those that have their tables in common stay one.
+    /// Splits several recordings into single ones, with their files or folders. Those with common tables stay together.
     pub(crate) fn apart(self, path: &Path) -> Vec<(PathBuf, Self)> {
         match self {
             Self::Kitti(drives) => each(drives, |drive| drive.folder.clone(), Self::Kitti),
@@ -332,7 +333,7 @@ impl Layout {
         }
     }
 
-    /// Opens what was found; the first is warned of what else looks like a recording there.
+    /// Opens what was found, and adds a warning to the first data set about what else looks like a recording.
     fn open_warning(&self, path: &Path, options: &OpenOptions) -> Result<Vec<Dataset>> {
         let mut datasets = self.open(path, options)?;
         if let (Some(first), Some(warning)) = (datasets.first_mut(), self.passed_over(path)) {
@@ -360,7 +361,7 @@ impl Layout {
     }
 }
 
-/// Opens each of several recordings; those without images of the camera, or without a selected frame, are left out.
+/// Opens several recordings, except those without images of the camera or without a selected frame.
 fn open_several(
     path: &Path,
     all: &[(PathBuf, Layout)],
@@ -394,7 +395,7 @@ fn open_several(
     }
 }
 
-/// A layout of each, with its place.
+/// A layout for each item, with its path.
 fn each<T>(
     all: Vec<T>,
     place: impl Fn(&T) -> PathBuf,
@@ -404,8 +405,8 @@ fn each<T>(
     all.into_iter().map(alone).collect()
 }
 
-/// The path as it was given, links and all, since a bag's file lies beside the link; what it resolves to where the given
-/// path ends without a name (`..`).
+/// The path as given, with unresolved links, since a bag's file may be beside the link; the resolved path if the given
+/// one does not end in a name (`..`).
 fn named(path: &Path, real: &Path) -> PathBuf {
     let given = std::path::absolute(path).ok();
     given
@@ -418,7 +419,7 @@ mod tests {
     use super::*;
     use std::fs;
 
-    /// Empty files, with their folders.
+    /// Writes empty files, with their folders.
     fn write(at: &Path, files: &[&str]) {
         for file in files {
             let path = at.join(file);
@@ -445,23 +446,23 @@ mod tests {
                 "kept/speed.csv",
             ],
         );
-        // The cache from where the video lies.
+        // The cache's path is relative to the video's folder.
         let named = "video = 'clips/drive.mp4'\nspeed = './logs/speed.csv'\nimu = 'logs/../unit/speed.csv'\ncache = '../kept'\n";
         fs::write(at.join(FolderConfig::NAME), named).unwrap();
         assert_eq!(Layout::of(at).unwrap().kind(), DatasetKind::Video);
         assert_eq!(passed_over(at), None);
-        // Nor are the outputs of a live run recordings.
+        // The outputs of a live run are not recordings either.
         write(at, &["live/live_video.mp4", "live/live-0.json"]);
         assert_eq!(passed_over(at), None);
         write(at, &["other/clip.mp4"]);
         let expected = format!(
-            "{} is read as video alone; this in it looks like a recording and is not read: other (give it by its own path)",
+            "{} is read only as video; this in it looks like a recording and is not read: other (give it by its own path)",
             at.display()
         );
         assert_eq!(passed_over(at), Some(expected));
     }
 
-    /// Of folders in a folder whose settings are for them.
+    /// In a folder whose settings apply to its subfolders.
     #[test]
     fn outputs_in_a_fleet_are_no_recordings_and_what_is_deeper_is_said() {
         let root = tempfile::tempdir().unwrap();

@@ -1,13 +1,13 @@
-//! What lies in the folder of a recording, looks like another one, and is not read with it.
+//! Finds what looks like another recording in a recording's folder, and is not read with it.
 
 use crate::dataset_toml::FolderConfig;
 use crate::formats::comma;
 use deepfusion_video::is_video;
 use std::path::{Path, PathBuf};
 
-/// Endings of bags.
+/// Extensions of bags.
 const BAGS: [&str; 3] = ["bag", "mcap", "db3"];
-/// What folders of recordings hold.
+/// Files and folders by which a folder is recognised as a recording.
 const MARKS: [&str; 9] = [
     FolderConfig::NAME,
     "speed.csv",
@@ -19,27 +19,27 @@ const MARKS: [&str; 9] = [
     "v1.0-trainval",
     "v1.0-test",
 ];
-/// How the name of what `predict` keeps of its work ends: videos beside it are outputs.
+/// End of the names of the manifests written by `predict`: videos beside them are outputs.
 const OUTPUTS: &str = ".manifest.json";
-/// The file of all targets that `perceive` writes.
+/// Name of the file of all targets, written by `perceive`.
 const TARGETS: &str = "targets.jsonl";
-/// What a folder of a video's decoded frames, whose name ends in `.frames`, says of them.
+/// Name of the file about the source in a folder of decoded frames, whose name ends in `.frames`.
 const ORIGIN: &str = "origin.json";
-/// How the names of the videos end that `predict` makes, of live sources too, whose folder has no such file.
+/// End of the names of videos written by `predict`, also from live sources, whose folder has no manifest.
 const OUTPUT_VIDEO: &str = "_video.mp4";
 
-/// What is looked for in a recording's folder.
+/// What to look for in a recording's folder.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NeighbourSearch<'a> {
-    /// Files and folders that are read.
+    /// Paths of files and folders that are read with the recording.
     pub(crate) used: &'a [PathBuf],
-    /// Whether a video is another recording.
+    /// Whether a video counts as another recording.
     pub(crate) videos: bool,
-    /// Whether a folder may be another recording, and not a part of this one.
+    /// Whether a folder may be another recording, instead of a part of this one.
     pub(crate) folders: bool,
 }
 
-/// The names of what looks like recordings in a folder, in their order. It is judged by names alone: among them there may be a hundred
+/// The sorted names of what looks like recordings in a folder. Only names are checked, because the folder may have a hundred
 /// thousand images.
 pub(crate) fn unread(folder: &Path, wanted: NeighbourSearch) -> Vec<String> {
     let mut found = Vec::new();
@@ -64,7 +64,7 @@ pub(crate) fn unread(folder: &Path, wanted: NeighbourSearch) -> Vec<String> {
     found
 }
 
-/// Whether a folder holds what was made of recordings: what `predict` and `perceive` write, or a video's decoded frames.
+/// Whether a folder has outputs: those of `predict` or `perceive`, or a video's decoded frames.
 pub(crate) fn holds_outputs(folder: &Path) -> bool {
     let is_of_frames = folder.extension().is_some_and(|ending| ending == "frames");
     let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
@@ -90,7 +90,7 @@ fn holds_a_recording(folder: &Path) -> bool {
     found
 }
 
-/// Whether a file is named like a video that is no output.
+/// Whether a file's name is that of a video, but not of an output.
 fn is_source_video(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().as_encoded_bytes();
     is_video(path) && !name.ends_with(OUTPUT_VIDEO.as_bytes())

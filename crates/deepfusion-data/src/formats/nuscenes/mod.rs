@@ -1,7 +1,8 @@
-//! nuScenes: tables of JSON in `v1.0-mini` (`-trainval`, `-test`), files in `samples` and `sweeps` beside it.
+//! Reads nuScenes: JSON tables in `v1.0-mini` (`-trainval`, `-test`), files in `samples` and `sweeps` beside it.
 //!
-//! A scene is a data set of the front camera's images, keyframes and sweeps by time. Every recording of every sensor has the vehicle's pose
-//! at its time, so that a scan is brought to the time of an image, and speed and yaw rate are the slopes of the camera's and the LiDAR's poses.
+//! A scene is a data set of the front camera's images, keyframes and sweeps ordered by time. Every image and scan has the vehicle's pose
+//! at its time. These poses move a scan to the time of an image, and speed and yaw rate are computed from those of the camera and the
+//! LiDAR.
 
 mod rows;
 mod tables;
@@ -25,17 +26,18 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
-/// An image is taken while the scanner passes it; the scan ends, and gets its time, up to a turn (50 ms) and what its times spread later.
+/// Longest time from an image to its scan: an image is taken when the scanner passes it, and the scan's time is that of its end, up to one
+/// turn (50 ms) plus jitter later.
 const SCAN_WITHIN_NS: i64 = 60_000_000;
 
-/// A folder of tables and the files they name.
+/// A folder of tables, and the root of the files they name.
 #[derive(Debug)]
 pub(crate) struct TableFolder {
     root: PathBuf,
     tables: PathBuf,
 }
 
-/// The data set at a path: its root, or the folder of its tables.
+/// Finds the data set at a path, which is its root or the folder of its tables.
 ///
 /// # Errors
 /// [`Error::File`]; [`Error::SeveralVersions`] for a root with several folders of tables.
@@ -69,7 +71,7 @@ fn has_tables(folder: &Path) -> bool {
     folder.join(SAMPLE_DATA).is_file()
 }
 
-/// Opens the scenes of which there are images, a data set each.
+/// Opens each scene that has images as a data set.
 pub(crate) fn open(
     path: &Path,
     place: &TableFolder,
@@ -107,7 +109,7 @@ pub(crate) fn open(
 }
 
 impl TableFolder {
-    /// `there` says which of the scene's images are; one is.
+    /// Opens a scene; `there` marks which of its images exist (at least one).
     fn open(&self, scene: Scene, there: &[bool], options: &OpenOptions) -> Result<Dataset> {
         let Scene {
             name,
@@ -177,14 +179,14 @@ impl TableFolder {
         .into_dataset()
     }
 
-    /// The scan of each image: the first that ended after it, in the place that the vehicle had when the image was taken.
+    /// The scan of each image: the first that ended after it, moved to the vehicle's pose at the image's time.
     fn truth(
         &self,
         images: &[(u64, &SensorFrame)],
         scans: &[SensorFrame],
         camera: &Intrinsics,
     ) -> Option<MeasuredDepth> {
-        // The reader's axes (x forward, y left) to the LiDAR's (x right, y forward).
+        // From the reader's axes (x forward, y left) to the LiDAR's (x right, y forward).
         let lidar_from_scan =
             Se3::from_axis_angle(Vector3::new(0.0, 0.0, FRAC_PI_2), Vector3::zeros());
         let mut files = BTreeMap::new();

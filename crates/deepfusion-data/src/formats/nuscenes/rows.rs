@@ -1,4 +1,4 @@
-//! Tables of JSON: an array of objects, read one at a time, since a table may be larger than the memory.
+//! Reads JSON tables (arrays of objects) one row at a time, since a table may be larger than memory.
 
 use crate::{Error, JsonProblem, MissingPart, Result};
 use memchr::memchr_iter;
@@ -7,19 +7,19 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-/// Bytes read at once.
+/// Number of bytes read at once.
 const CHUNK: usize = 1 << 20;
 
-/// One object of a table, not yet read.
+/// One row (object) of a table, not parsed yet.
 pub(super) struct Row<'a> {
     table: &'a Path,
-    /// Where it begins, counted from 1.
+    /// Line at which it begins, counted from 1.
     line: usize,
     text: &'a [u8],
 }
 
 impl<'a> Row<'a> {
-    /// Its fields; what is not asked for is passed over.
+    /// Parses its fields; unknown ones are ignored.
     ///
     /// # Errors
     /// [`Error::Json`] with line and field.
@@ -48,7 +48,7 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// The line of a field; the row's first where it has none such.
+    /// The line of a field; the row's first line if it does not have the field.
     pub(super) fn line_of(&self, field: &str) -> usize {
         let key = format!("\"{field}\"");
         let at = memchr::memmem::find(self.text, key.as_bytes()).unwrap_or(0);
@@ -59,7 +59,7 @@ impl<'a> Row<'a> {
 /// Calls `each` with every row of the table at `path`.
 ///
 /// # Errors
-/// [`Error::Missing`], [`Error::File`]; [`Error::Json`] with the line where the file is no array of objects, or ends within it.
+/// [`Error::Missing`], [`Error::File`]; [`Error::Json`] with the line if the file is not an array of objects, or is truncated.
 pub(super) fn each_row(path: &Path, mut each: impl FnMut(&Row<'_>) -> Result<()>) -> Result<()> {
     let file = File::open(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::Missing {
@@ -77,7 +77,7 @@ pub(super) fn each_row(path: &Path, mut each: impl FnMut(&Row<'_>) -> Result<()>
             break;
         }
         let length = chunk.len();
-        // Where what belongs to the row begins in this chunk, and how far its lines are counted.
+        // Start of the current row in this chunk, and the position up to which lines are counted.
         let (mut from, mut counted) = (0, 0);
         for (i, byte) in chunk.iter().enumerate() {
             match scanner.step(*byte) {
@@ -140,7 +140,7 @@ fn last_key(text: &[u8]) -> String {
 #[derive(Default)]
 struct RowScanner {
     state: ScanState,
-    /// Open braces and brackets of a row.
+    /// Number of open braces and brackets in the row.
     depth: usize,
     in_text: bool,
     escaped: bool,
@@ -278,7 +278,7 @@ mod tests {
                 b"{\"name\": \"a\", \"n\": 1}",
                 1,
                 "the array",
-                "'{' is not expected",
+                "unexpected '{'",
             ),
             (b"", 1, "the array", "ends within"),
         ];
@@ -302,7 +302,7 @@ mod tests {
         }
     }
 
-    /// A row that lies across what is read at once.
+    /// A row that crosses the boundary between two chunks.
     #[test]
     fn rows_may_be_longer_than_a_chunk() {
         let long = "x".repeat(CHUNK + 5);

@@ -1,4 +1,4 @@
-//! The tables of nuScenes, as far as one camera and the LiDAR need them.
+//! Reads the tables of nuScenes that are needed for one camera and the LiDAR.
 
 use super::rows::{Row, each_row};
 use crate::{Error, JsonProblem, Result};
@@ -16,7 +16,7 @@ pub(super) const LIDAR: &str = "LIDAR_TOP";
 pub(super) const SAMPLE_DATA: &str = "sample_data.json";
 pub(super) const CALIBRATED_SENSOR: &str = "calibrated_sensor.json";
 
-/// A row's name: 32 hexadecimal digits, kept as the number that they are, since there are millions.
+/// A row's token: 32 hexadecimal digits, kept as a number to save memory, since there are millions.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Token(u128);
 
@@ -28,7 +28,7 @@ impl fmt::Display for Token {
 
 impl<'de> Deserialize<'de> for Token {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        /// Reads the digits where they are, without a copy of the text.
+        /// Parses the digits without copying the text.
         struct Digits;
         impl Visitor<'_> for Digits {
             type Value = Token;
@@ -42,7 +42,7 @@ impl<'de> Deserialize<'de> for Token {
                 let number = u128::from_str_radix(text, 16).ok().filter(|_| digits);
                 number.map(Token).ok_or_else(|| {
                     let shown: String = text.chars().take(40).collect();
-                    E::custom(format!("'{shown}' is no token (32 hexadecimal digits)"))
+                    E::custom(format!("'{shown}' is not a token (32 hexadecimal digits)"))
                 })
             }
         }
@@ -96,27 +96,27 @@ struct PoseRow {
     rotation: [f64; 4],
 }
 
-/// A sensor on its vehicle.
+/// A sensor's mount on the vehicle, and its intrinsics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Mounted {
-    /// Axes of the vehicle: x forward, y left, z up, above the middle of the rear axle.
+    /// The transform from the sensor to the vehicle (x forward, y left, z up, origin above the middle of the rear axle).
     pub(super) vehicle_from_sensor: Se3,
-    /// fx, fy, cx, cy; of a camera.
+    /// fx, fy, cx, cy, if the sensor is a camera.
     pub(super) pinhole: Option<[f64; 4]>,
 }
 
-/// An image or a scan, with the pose of its vehicle.
+/// An image or a scan, with the vehicle's pose.
 #[derive(Debug, Clone)]
 pub(super) struct SensorFrame {
-    /// Nanoseconds since 1970.
+    /// Time, nanoseconds since 1970.
     pub(super) ns: i64,
-    /// Below the root.
+    /// Path of the file, relative to the root.
     pub(super) file: String,
     pub(super) world_from_vehicle: Se3,
     pub(super) sensor: Mounted,
 }
 
-/// What was recorded in a scene, by time.
+/// The images and scans of a scene, ordered by time.
 #[derive(Debug, Clone)]
 pub(super) struct Scene {
     pub(super) name: String,
@@ -130,7 +130,7 @@ enum SensorKind {
     Lidar,
 }
 
-/// A row of `sample_data.json` before its pose is known.
+/// A row of `sample_data.json` whose pose has not been looked up yet.
 struct UnposedFrame {
     scene: usize,
     kind: SensorKind,
@@ -138,15 +138,15 @@ struct UnposedFrame {
     file: String,
     sensor: Mounted,
     pose: Token,
-    /// Of its pose's token.
+    /// Line of its pose's token.
     line: usize,
 }
 
-/// Reads the tables in a folder; scenes in order of their names.
+/// Reads the tables in a folder. Returns the scenes, ordered by name.
 ///
 /// # Errors
-/// [`Error::Missing`] for a table that is not there, [`Error::Json`] for one that cannot be read or names a row that another
-/// has not.
+/// [`Error::Missing`] for a missing table, [`Error::Json`] for one that cannot be read or refers to a missing row of
+/// another.
 pub(super) fn read_scenes(folder: &Path) -> Result<Vec<Scene>> {
     let sensors = calibrated_sensors(folder)?;
     let (mut scenes, mut scene_of) = (Vec::new(), HashMap::new());
@@ -228,7 +228,7 @@ pub(super) fn read_scenes(folder: &Path) -> Result<Vec<Scene>> {
     Ok(scenes)
 }
 
-/// The row of another table that a field names.
+/// The row of another table to which a field refers.
 fn named<T: Copy>(
     row: &Row<'_>,
     field: &str,
@@ -243,7 +243,7 @@ fn named<T: Copy>(
     })
 }
 
-/// The sensors on their vehicles; `None` where it is neither the camera nor the LiDAR.
+/// The sensors' mounts by token; `None` for sensors other than the camera and the LiDAR.
 fn calibrated_sensors(folder: &Path) -> Result<HashMap<Token, Option<(SensorKind, Mounted)>>> {
     let mut channels = HashMap::new();
     let path = folder.join("sensor.json");
@@ -293,7 +293,7 @@ fn calibrated_sensors(folder: &Path) -> Result<HashMap<Token, Option<(SensorKind
     Ok(sensors)
 }
 
-/// `world_from_vehicle` of the rows that are wanted.
+/// `world_from_vehicle` of the rows in `wanted`.
 fn ego_poses(folder: &Path, wanted: HashSet<Token>) -> Result<HashMap<Token, Se3>> {
     let mut poses = HashMap::with_capacity(wanted.len());
     each_row(&folder.join("ego_pose.json"), |row| {
@@ -306,7 +306,7 @@ fn ego_poses(folder: &Path, wanted: HashSet<Token>) -> Result<HashMap<Token, Se3
     Ok(poses)
 }
 
-/// A motion of a unit quaternion w, x, y, z and a place in metres.
+/// A rigid transform from a unit quaternion w, x, y, z and a translation in metres.
 fn motion(row: &Row<'_>, rotation: [f64; 4], translation: [f64; 3]) -> Result<Se3> {
     let norm = rotation.iter().map(|q| q * q).sum::<f64>().sqrt();
     if (norm - 1.0).abs() > 1e-2 {

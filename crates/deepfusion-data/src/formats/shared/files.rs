@@ -1,4 +1,4 @@
-//! What is in a folder.
+//! Lists the files and folders in a folder.
 
 pub(crate) use crate::names::name_of;
 use crate::{Error, Result};
@@ -6,8 +6,8 @@ use deepfusion_fs::natural_order;
 use deepfusion_images::is_image;
 use std::path::{Path, PathBuf};
 
-/// The names of a path: as it was given, and with its links resolved, where that is another. Layouts that are recognised by the folders above
-/// look at both: a part of a data set is often a link to another disk.
+/// A path as given, and with its links resolved if that differs. Layouts that are recognised by the folders above
+/// check both, because a part of a data set is often a link to another disk.
 ///
 /// # Errors
 /// [`Error::File`].
@@ -18,10 +18,10 @@ fn both_names(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(given.into_iter().chain([real]).collect())
 }
 
-/// What is found by the first of a path's [names](both_names) by which anything is.
+/// The result of `find` for the first of a path's [names](both_names) with a non-empty result.
 ///
 /// # Errors
-/// As [`both_names`], and those of `find`.
+/// Those of [`both_names`] and of `find`.
 pub(crate) fn by_either_name<T>(
     path: &Path,
     find: impl Fn(PathBuf) -> Result<Vec<T>>,
@@ -35,7 +35,7 @@ pub(crate) fn by_either_name<T>(
     Ok(Vec::new())
 }
 
-/// The PNG and JPEG files of a folder in their natural order, hidden ones left out. A folder that is not there is an error.
+/// The PNG and JPEG files of a folder in natural order, without hidden ones. A missing folder is an error.
 pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
@@ -49,7 +49,7 @@ pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(images)
 }
 
-/// The folders in a folder, in order of their names, without hidden ones.
+/// The folders in a folder, ordered by name, without hidden ones.
 pub(crate) fn folders(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {

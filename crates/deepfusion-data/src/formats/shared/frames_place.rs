@@ -1,15 +1,15 @@
-//! Where the frames of a video are kept, once decoded, that no settings name a folder for.
+//! Chooses the folder for a video's decoded frames if the settings do not name one.
 
 use crate::{Error, Result};
 use deepfusion_video::{frames_folder, holds_frames_of};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The video's own folder, or, where nothing can be written there (a card, a share), one in the user's cache folder. That is found out before
-/// hours of work, and nothing is written for it: who looks into a recording may never need its frames.
+/// The video's own folder, or one in the user's cache folder if the former is not writable (a memory card, a network share). This is
+/// checked before hours of work, without writing anything, since inspecting a recording may never need its frames.
 ///
 /// # Errors
-/// [`Error::NoPlaceForFrames`] where neither can be written.
+/// [`Error::NoPlaceForFrames`] if neither is writable.
 pub(crate) fn folder_for_frames(video: &Path, user_cache: Option<PathBuf>) -> Result<PathBuf> {
     let beside = video.parent().unwrap_or(Path::new("."));
     let name = video.file_name().unwrap_or_default().to_string_lossy();
@@ -25,24 +25,24 @@ pub(crate) fn folder_for_frames(video: &Path, user_cache: Option<PathBuf>) -> Re
     })
 }
 
-/// Whether a video's frames are there, as it is now, or a folder for them can be made.
+/// Whether the frames of the current version of a video exist, or a folder for them can be created.
 fn can_keep(frames: &Path, video: &Path) -> io::Result<()> {
     if holds_frames_of(frames, video) {
         return Ok(());
     }
-    // Of a link, what it leads to: frames are kept where there is room for them.
+    // Resolve a link: users may link the folder to a disk with more space.
     let real = frames.canonicalize();
     can_be_made(real.as_deref().unwrap_or(frames))
 }
 
-/// Whether a folder can be made, with those around it that are not there: what the system says without trying it.
+/// Whether a folder can be created, with its missing parents, according to the system's permissions, without trying it.
 #[cfg(unix)]
 fn can_be_made(folder: &Path) -> io::Result<()> {
     use nix::unistd::{AccessFlags, access};
     use std::io::ErrorKind;
 
     for around in folder.ancestors().skip(1) {
-        // Around a bare name.
+        // The parent of a plain file name.
         let around = if around.as_os_str().is_empty() {
             Path::new(".")
         } else {
@@ -82,13 +82,13 @@ mod tests {
         assert_eq!(found, root.path());
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 0);
 
-        // Nobody, not even the administrator, can write into a file.
+        // Nobody, not even root, can create a folder inside a file.
         let card = root.path().join("card");
         fs::write(&card, "").unwrap();
         let video = card.join("drive.mp4");
         let found = folder_for_frames(&video, Some(cache.clone())).unwrap();
         assert_eq!(found, cache.join("deepfusion/frames"));
-        assert!(!cache.exists(), "it was only tried");
+        assert!(!cache.exists(), "nothing is created");
 
         let error = folder_for_frames(&video, Some(card)).unwrap_err();
         assert!(matches!(error, Error::NoPlaceForFrames { .. }), "{error}");
@@ -96,7 +96,7 @@ mod tests {
         assert!(hint.contains("cache = "), "{hint}");
     }
 
-    /// Programs that watch a folder, to copy it or to index it, would start for nothing.
+    /// The folder must not change, or programs that watch it, to copy or index it, would start needlessly.
     #[cfg(unix)]
     #[test]
     fn to_find_a_place_writes_nothing() {
@@ -123,7 +123,7 @@ mod tests {
         assert!(keeps());
         let allow = |mode| fs::set_permissions(&disk, fs::Permissions::from_mode(mode)).unwrap();
         allow(0o555);
-        // The administrator can.
+        // Root can.
         let can = fs::create_dir(disk.join("tried")).is_ok();
         assert_eq!(keeps(), can);
         allow(0o755);

@@ -1,5 +1,5 @@
-//! What several layouts share: files and folders by name, poses and what follows from them, the recording that all but bags and KITTI raw
-//! make.
+//! Code shared by several layouts: listing files, poses and the motion computed from them, and the recording used by all layouts except
+//! bags and KITTI raw.
 
 pub(super) mod files;
 pub(super) mod frames_place;

@@ -1,4 +1,4 @@
-//! What the layouts of frames in files or in a video have in common: one camera, times, speeds, poses, measured depth.
+//! The recording for layouts with frames in files or in a video: one camera, times, speeds, poses, measured depth.
 
 use crate::dataset::selection::Selection;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
@@ -17,10 +17,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Opens several recordings found at `path`, a data set each; those without a selected frame are left out.
+/// Opens each of several recordings found at `path` as a data set, except those without a selected frame.
 ///
 /// # Errors
-/// That of the first that cannot be opened; [`Error::SplitSelectsNothing`] where no frame of any is selected.
+/// The error of the first that cannot be opened; [`Error::SplitSelectsNothing`] if no frame of any is selected.
 pub(crate) fn open_each<T>(
     path: &Path,
     found: impl IntoIterator<Item = T>,
@@ -56,11 +56,11 @@ pub(crate) struct PlainRecording {
     world_from_cam: BTreeMap<u64, Se3>,
     streams: Vec<Stream>,
     warnings: Vec<DataWarning>,
-    /// Why there is no ego-motion, where there is none.
+    /// The reason reported if there is no ego-motion.
     no_motion: NoTrackReason,
 }
 
-/// What a layout found, before it is a [`Dataset`].
+/// The parts found by a layout, from which a [`Dataset`] is made.
 pub(crate) struct PlainParts {
     pub(crate) kind: DatasetKind,
     pub(crate) folder: PathBuf,
@@ -68,22 +68,22 @@ pub(crate) struct PlainParts {
     pub(crate) images: Vec<TimedImage>,
     pub(crate) video: Option<VideoFrames>,
     pub(crate) calibration: CameraCalibration,
-    /// How far the camera's clock is ahead of that of the speeds, in seconds.
+    /// How far the camera's clock is ahead of the speeds' clock, in seconds.
     pub(crate) camera_ahead_s: f64,
-    /// Of the first image.
+    /// Width and height of the first image, in pixels.
     pub(crate) image_size: (u32, u32),
     pub(crate) speeds: Option<SpeedLog>,
     pub(crate) cam_from_vehicle: Se3,
-    /// Whether nothing says where the camera is on the vehicle, though it matters.
+    /// Whether the camera's mount is needed, but only assumed.
     pub(crate) mount_assumed: bool,
-    /// Of the vehicle's cameras.
+    /// Which of the vehicle's cameras it is.
     pub(crate) camera: Camera,
     pub(crate) truth: Option<MeasuredDepth>,
     pub(crate) world_from_cam: BTreeMap<u64, Se3>,
-    /// Beside those of the images, the speeds, the poses and the measured depth.
+    /// Streams other than those of images, speeds, poses and measured depth.
     pub(crate) streams: Vec<Stream>,
     pub(crate) warnings: Vec<DataWarning>,
-    /// Whether there are poses, but no times to make speeds of them.
+    /// Whether there are poses, but no times to compute speeds from them.
     pub(crate) untimed_poses: bool,
 }
 
@@ -91,7 +91,7 @@ impl PlainParts {
     /// The recording as a data set of all its frames.
     ///
     /// # Errors
-    /// [`Error::Clocks`] where frames and speeds have no time in common, [`Error::CameraFile`],
+    /// [`Error::Clocks`] if the times of frames and speeds do not overlap, [`Error::CameraFile`],
     /// [`Error::FrameSize`], [`Error::Image`], [`Error::Motion`].
     pub(crate) fn into_dataset(mut self) -> Result<Dataset> {
         if self.mount_assumed {
@@ -185,7 +185,7 @@ impl PlainParts {
         Ok(dataset)
     }
 
-    /// The correction is as large as the calibration says: the images must say so too.
+    /// Checks that the images have the size of the calibration, for which the lens correction was computed.
     fn check_size(&self) -> Result<()> {
         let k = &self.calibration.intrinsics;
         if self.image_size == (k.width, k.height) {
@@ -204,7 +204,7 @@ impl PlainParts {
         })
     }
 
-    /// Frames without a speed are a warning; if none has one, the clocks differ.
+    /// Warns about frames without a speed. If no frame has one, the clocks differ, which is an error.
     fn check_clocks(&mut self, frames: &[Frame]) -> Result<()> {
         let Some(log) = &self.speeds else {
             return Ok(());
@@ -235,7 +235,7 @@ impl PlainParts {
     }
 
     fn describe_camera(&mut self, lens: &Lens) {
-        // A layout with a calibration of its own has images of one size, and what is assumed is learned.
+        // A layout with its own calibration has images of one size, and an assumed camera is learned in training.
         let known = self.calibration.size_in_file || self.calibration.assumed;
         if !known && !self.kind.brings_calibration() {
             let k = &self.calibration.intrinsics;
@@ -271,7 +271,7 @@ impl Recording for PlainRecording {
             _ => load_rgb(frame.image.path())?,
         };
         let k = self.lens.intrinsics();
-        // One of another size is reported by the data set, which knows the frame.
+        // The data set reports an image of another size, since it knows the frame.
         if image.dimensions() == (k.width, k.height) {
             self.lens.correct(image)
         } else {

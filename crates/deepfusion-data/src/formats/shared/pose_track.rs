@@ -1,4 +1,4 @@
-//! Speed, yaw rate, roll and pitch of a vehicle whose poses are known.
+//! Computes speed, yaw rate, roll and pitch of a vehicle from its poses.
 
 use crate::logs::clock::seconds;
 use crate::logs::samples::Samples;
@@ -8,28 +8,28 @@ use nalgebra::{Matrix2, Matrix3, Rotation3, Vector2, Vector3};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-/// Poses up to this far before and after a time say how fast the vehicle is then, in seconds: at 10 Hz the two neighbours, at
-/// nuScenes' 32 poses a second ten, whose jitter of centimetres they average.
+/// Poses within this time before and after a moment are used for the speed at that moment, in seconds: at 10 Hz the two neighbours, with
+/// nuScenes' 32 poses per second ten, which averages their jitter of centimetres.
 const WINDOW_S: f64 = 0.16;
 /// Poses farther apart are not bridged, as in [`crate::VehicleTrack`].
 const MAX_GAP_S: f64 = 0.5;
-/// Poses closer together than this, in ns, are one.
+/// Poses closer together than this count as one, in ns.
 const LEAST_STEP_NS: i64 = 2_000_000;
-/// A way from which the direction of travel is taken, in metres.
+/// Shortest distance from which the direction of travel is determined, in metres.
 const LEAST_WAY_M: f64 = 20.0;
-/// Cosine of the angle between a camera's axis and the direction of travel beyond which it does not look ahead: 20°.
+/// Least cosine of the angle between the camera's axis and the direction of travel: 20°.
 const AHEAD: f64 = 0.94;
 
-/// The speeds of a vehicle (x forward, y left, z up, metres) from its poses in any world that does not move, on the clock of their
-/// times (ns). A pose without another within half a second has none.
+/// The speeds of a vehicle (x forward, y left, z up, metres) from its poses in any fixed world frame, on the clock of their
+/// times (ns). A pose without another within half a second has no speed.
 ///
-/// Speed and yaw rate are slopes of a parabola through the poses nearby (least squares); of three poses at equal steps that is the
-/// central difference. The speed is the velocity along the vehicle's x, the yaw rate the heading's about the mean of its z.
+/// Speed and yaw rate are slopes of a parabola through the nearby poses (least squares); for three poses at equal steps this is the
+/// central difference. The speed is the velocity along the vehicle's x, the yaw rate that of the heading about the mean of its z.
 pub(crate) fn speed_log(path: &Path, world_from_vehicle: &[(i64, Se3)]) -> SpeedLog {
     let level_from_world = upright(world_from_vehicle.iter().map(|(_, pose)| pose));
     let (mut ns, mut speeds, mut yaw_rates) = (Vec::new(), Vec::new(), Vec::new());
     let mut tilts_rad = Vec::new();
-    // As recorders repeat lines: what is not later than the pose before is none, and what is hardly later says no slope.
+    // Recorders may repeat lines: leave out poses that are not later, or hardly later, than the previous one, since they give no slope.
     let mut rising: Vec<(i64, Se3)> = Vec::with_capacity(world_from_vehicle.len());
     for pose in world_from_vehicle {
         if rising
@@ -84,17 +84,18 @@ pub(crate) fn speed_log(path: &Path, world_from_vehicle: &[(i64, Se3)]) -> Speed
     }
 }
 
-/// The vehicle in a camera whose place on it alone is known (`vehicle_in_cam`, metres): its forward axis is the direction in which
-/// its origin moves, its left side level with the camera. Where the way is too short to tell, the camera looks straight ahead.
+/// The transform from the vehicle to a camera of which only the position is known (`vehicle_in_cam`: the vehicle's origin in the camera,
+/// metres). The vehicle's forward axis is the direction in which its origin moves, and its left axis is level with the camera. If the path
+/// is too short, the camera is assumed to look straight ahead.
 pub(crate) fn cam_from_vehicle(world_from_cam: &[Se3], vehicle_in_cam: Vector3<f64>) -> Se3 {
     let (mut forward, mut way_m) = (Vector3::zeros(), 0.0);
     for pair in world_from_cam.windows(2) {
         let place = |pose: &Se3| pose.transform(&vehicle_in_cam);
         let moved = place(&pair[1]) - place(&pair[0]);
-        // Halfway between both attitudes, as the chord of an arc lies.
+        // The chord of an arc has the direction halfway between both attitudes.
         let middle = pair[0].interpolate(&pair[1], 0.5).inverse();
         let moved = middle.rotate(&moved);
-        // Reversing, it goes the other way.
+        // Flip the direction when reversing.
         forward += moved * moved.z.signum();
         way_m += moved.norm();
     }
@@ -109,18 +110,18 @@ pub(crate) fn cam_from_vehicle(world_from_cam: &[Se3], vehicle_in_cam: Vector3<f
     Se3::from_parts(&axes, vehicle_in_cam)
 }
 
-/// The turn of the world that makes the poses' mean z point up. Motions between poses are the same about any vertical; a vertical
+/// The rotation of the world that makes the poses' mean z point up. It does not change motions between poses, but a vertical
 /// near the true one keeps roll and pitch small.
 fn upright<'a>(poses: impl Iterator<Item = &'a Se3>) -> Matrix3<f64> {
     let up: Vector3<f64> = poses.map(|pose| pose.rotate(&Vector3::z())).sum();
-    // Of a world whose z points down no shortest turn is the one.
+    // If the world's z points exactly down, the shortest rotation is not unique.
     let turn = Rotation3::rotation_between(&up, &Vector3::z());
     *turn
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), PI))
         .matrix()
 }
 
-/// Angles without jumps of a whole turn.
+/// The angles without jumps by a full turn.
 fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut all: Vec<f64> = Vec::new();
     for angle in angles {
@@ -130,7 +131,7 @@ fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
     all
 }
 
-/// The poses that say how fast the one at `i` moves: those within the window, and at least three, where there are.
+/// The poses used for the speed at `i`: those within the window, and at least three if possible.
 fn neighbours(stretch: &[(i64, Se3)], i: usize) -> std::ops::Range<usize> {
     let away = |j: usize| seconds(stretch[j].0, stretch[i].0).abs();
     let (mut from, mut to) = (i, i + 1);
@@ -140,7 +141,7 @@ fn neighbours(stretch: &[(i64, Se3)], i: usize) -> std::ops::Range<usize> {
     while to < stretch.len() && away(to) <= WINDOW_S {
         to += 1;
     }
-    // One on either side first: slopes at a window's end are the worst.
+    // Add one on each side first, since slopes at a window's end are the least accurate.
     if from == i {
         from = from.saturating_sub(1);
     }
@@ -155,8 +156,8 @@ fn neighbours(stretch: &[(i64, Se3)], i: usize) -> std::ops::Range<usize> {
     from..to
 }
 
-/// Weights of values at times (s) whose sum is the slope at 0 of the parabola through them, by least squares; of a straight line
-/// where there are two.
+/// Weights for values at times (s) whose weighted sum is the slope at 0 of the least-squares parabola through them; of a straight line
+/// for two values.
 fn slope_weights(times_s: &[f64]) -> Vec<f64> {
     let power = |k: i32| times_s.iter().map(|t| t.powi(k)).sum::<f64>();
     let [n, s1, s2, s3, s4] = [0, 1, 2, 3, 4].map(power);

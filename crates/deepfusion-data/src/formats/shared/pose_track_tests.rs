@@ -1,7 +1,7 @@
 use super::*;
 use crate::MotionModel;
 
-/// A vehicle at a place with a heading, upright, in a world whose z points up.
+/// An upright vehicle at a position with a heading, in a world whose z points up.
 fn pose(x: f64, y: f64, heading: f64) -> Se3 {
     Se3::from_axis_angle(Vector3::new(0.0, 0.0, heading), Vector3::new(x, y, 0.0))
 }
@@ -10,7 +10,7 @@ fn ns(time_s: f64) -> i64 {
     1_400_000_000_000_000_000 + (time_s * 1e9).round() as i64
 }
 
-/// Poses of a circle of radius `r` at a constant speed, at these times.
+/// Poses on a circle of radius `r` at a constant speed, at these times.
 fn circle(r: f64, speed: f64, times: &[f64]) -> Vec<(i64, Se3)> {
     let at = |t: &f64| {
         let angle = speed * t / r;
@@ -26,7 +26,7 @@ fn log(poses: &[(i64, Se3)]) -> SpeedLog {
     speed_log(Path::new("poses.txt"), poses)
 }
 
-/// Of a straight drive at constant acceleration a parabola is exact, at equal and unequal steps, at both ends, and driving back.
+/// For a straight drive at constant acceleration, a parabola is exact: at equal and unequal steps, at both ends, and in reverse.
 #[test]
 fn a_parabola_is_exact_for_constant_acceleration() {
     let times = [0.0, 0.1, 0.19, 0.31, 0.4, 0.42, 0.55, 0.9, 1.3];
@@ -41,8 +41,8 @@ fn a_parabola_is_exact_for_constant_acceleration() {
     assert!(turns.iter().all(|w| w.abs() < 1e-9), "{turns:?}");
 }
 
-/// Central differences of a circle: the chord over 2h instead of the arc, a share of (ωh)²/6 too short; at the ends, where a parabola
-/// through one side says the slope, twice that. Heading is straight in time, so that its slope is exact.
+/// Central differences on a circle: the chord over 2h instead of the arc is too short by a fraction of (ωh)²/6; at the ends, with a
+/// parabola through one side, by twice that. The heading is linear in time, so its slope is exact.
 #[test]
 fn a_circle_is_found_to_the_second_order() {
     let (r, speed, h) = (12.0, 6.0, 0.1);
@@ -58,7 +58,7 @@ fn a_circle_is_found_to_the_second_order() {
         assert!((off - expected).abs() < 0.01, "{i}: {off} of the order");
         assert!((w - omega).abs() < 1e-9, "{i}: {w}");
     }
-    // The motion between neighbours is the truth's.
+    // The motion between neighbours is the true one.
     let track: MotionModel = log.motion(ns(0.0)).unwrap().0;
     let motion = track.motion(1.0, 1.1).unwrap().vehicle0_from_vehicle1();
     let poses = circle(r, speed, &times);
@@ -70,7 +70,8 @@ fn a_circle_is_found_to_the_second_order() {
     );
 }
 
-/// A world with z down or camera axes gives the same, since motions are the vehicle's own; a heading that passes half a turn is no jump.
+/// A world with z down or camera axes gives the same motions, since these are relative to the vehicle. A heading that passes half a turn
+/// does not jump.
 #[test]
 fn the_world_s_axes_do_not_matter() {
     let times: Vec<f64> = (0..80).map(|i| f64::from(i) * 0.1).collect();
@@ -96,7 +97,7 @@ fn the_world_s_axes_do_not_matter() {
     }
 }
 
-/// A body that rolls and pitches as it goes: its rotation between two poses is the poses' own, to what the yaw rate's slope leaves.
+/// A body that rolls and pitches: its rotation between two poses is that of the poses, up to the error of the yaw rate's slope.
 #[test]
 fn roll_and_pitch_are_the_poses() {
     let at = |i: i32| {
@@ -122,12 +123,12 @@ fn roll_and_pitch_are_the_poses() {
     }
 }
 
-/// Jitter of a centimetre: at 32 poses a second the slope is sure to 3 cm/s, where neighbours alone would leave 23.
+/// Jitter of a centimetre: with 32 poses per second the slope's error is 3 cm/s; with only the two neighbours it would be 23.
 #[test]
 fn many_poses_average_their_jitter() {
     let mut state = 1_u64;
     let mut jitter = || {
-        // A linear congruential generator; twelve uniform numbers make nearly a normal one.
+        // A linear congruential generator; the sum of twelve uniform numbers is nearly normal.
         let mut uniform = || {
             state = state
                 .wrapping_mul(6_364_136_223_846_793_005)
@@ -149,7 +150,7 @@ fn many_poses_average_their_jitter() {
     assert!((0.02..0.045).contains(&rms), "{rms}");
 }
 
-/// Two poses make a straight line; what is alone, or behind a gap, has no speed.
+/// Two poses give a straight line; a single pose, or one after a gap, has no speed.
 #[test]
 fn gaps_are_not_bridged() {
     let at = |t: f64| (ns(t), pose(5.0 * t, 0.0, 0.0));
@@ -160,7 +161,7 @@ fn gaps_are_not_bridged() {
     assert!(log.speeds_mps.values.iter().all(|v| (v - 5.0).abs() < 1e-6));
 }
 
-/// A camera that looks two degrees up and one to the right of where the car goes, 1 m before its axle.
+/// A camera that looks two degrees up and one to the right of the direction of travel, 1 m ahead of the axle.
 #[test]
 fn a_camera_finds_the_way_the_car_goes() {
     let nominal = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
@@ -174,12 +175,12 @@ fn a_camera_finds_the_way_the_car_goes() {
         .map(|(_, pose)| *pose * cam_from_car.inverse())
         .collect();
     let found = cam_from_vehicle(&poses, vehicle_in_cam);
-    // The camera's roll about that direction is not seen: of the second order here.
+    // The camera's roll about that direction is not observable; here it is of second order.
     let error = (found.inverse() * cam_from_car).angle();
     assert!(error < 2e-3, "{error}");
     let forward = (found.inverse() * cam_from_car).rotate(&Vector3::x());
     assert!((forward - Vector3::x()).norm() < 1e-6, "{forward}");
-    // Ten frames of 8 m are too short a way.
+    // Ten frames over 8 m are too short a path.
     let short = cam_from_vehicle(&poses[..10], vehicle_in_cam);
     assert!((short.rotate(&Vector3::x()) - Vector3::z()).norm() < 1e-12);
 }

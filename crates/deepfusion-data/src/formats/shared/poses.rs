@@ -1,20 +1,20 @@
-//! Files of poses: a line each, of a number of columns of numbers.
+//! Reads pose files: one pose per line, as a fixed number of columns.
 
 use crate::{Error, PoseField, PoseProblem, Result};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
-/// How far the product of a printed rotation and its transpose may be from the identity.
+/// Largest deviation from the identity of the product of a printed rotation and its transpose.
 const ORTHONORMAL: f64 = 1e-2;
 
-/// Whether a matrix is a rotation, up to the digits that files have.
+/// Whether a matrix is a rotation, up to the rounding in files.
 pub(crate) fn is_rotation(matrix: &Matrix3<f64>) -> bool {
     (matrix.transpose() * matrix - Matrix3::identity()).norm() <= ORTHONORMAL
         && matrix.determinant() > 0.0
 }
 
-/// A motion from the upper three rows of its matrix, row by row, in metres; `None` where its matrix is no rotation.
+/// A rigid transform from the upper three rows of its matrix, row by row, in metres; `None` if its matrix is not a rotation.
 pub(crate) fn motion_of_rows(numbers: &[f64]) -> Option<Se3> {
     let at = |row: usize, column: usize| numbers.get(4 * row + column).copied().unwrap_or(f64::NAN);
     let rotation = Matrix3::from_fn(at);
@@ -23,7 +23,7 @@ pub(crate) fn motion_of_rows(numbers: &[f64]) -> Option<Se3> {
     is_motion.then(|| Se3::from_parts(&rotation, place))
 }
 
-/// The lines of a file of poses, each of `columns` finite numbers; with the line's number, counted from 1. Empty lines are skipped.
+/// The lines of a pose file, each with `columns` finite numbers, and their line numbers, counted from 1. Empty lines are skipped.
 ///
 /// # Errors
 /// [`Error::File`]; [`Error::Pose`] with line and column.
@@ -65,11 +65,11 @@ pub(crate) fn rows_of_numbers(path: &Path, columns: usize) -> Result<Vec<(usize,
     Ok(rows)
 }
 
-/// Poses with a frame's number before each, if `numbered`; else the number is the line's, counted from 0. `columns` of a
-/// pose: 12, or 16 with the matrix' last row.
+/// Reads poses with their frame numbers: if `numbered`, the first number of each line, otherwise the line's number, counted from 0. A
+/// pose has 12 `columns`, or 16 with the matrix' last row.
 ///
 /// # Errors
-/// As [`rows_of_numbers`], and [`Error::Pose`] for what is no frame's number or no motion.
+/// Those of [`rows_of_numbers`], and [`Error::Pose`] for an invalid frame number or matrix.
 pub(crate) fn read_poses(path: &Path, numbered: bool, columns: usize) -> Result<Vec<(u64, Se3)>> {
     let first = usize::from(numbered);
     let rows = rows_of_numbers(path, columns + first)?;
