@@ -124,7 +124,7 @@ fn no_topic_and_a_signal_do_not_contradict_each_other() {
 
 /// All bits set means a missing value in J1939: here 655.35 km/h.
 #[test]
-fn a_value_that_a_bus_has_not_is_no_speed() {
+fn values_outside_a_signals_range_are_left_out() {
     let drive = Drive::new(BY_DBC, |bag| {
         bag.can("/can", &ten_mps()).can("/can", &frame(0x158, -1));
         bag.can("/can", &ten_mps());
@@ -204,7 +204,7 @@ fn steering_on_the_bus_is_not_mixed_with_a_topics() {
 }
 
 #[test]
-fn one_topic_is_chosen_by_its_type() {
+fn the_speeds_topic_is_chosen_by_its_type() {
     let drive = Drive::new("", |bag| {
         bag.ackermann("/drive", 3.0, 0.0).odometry("/odom", 4.0);
         bag.twist("/twist", 5.0);
@@ -221,7 +221,7 @@ fn one_topic_is_chosen_by_its_type() {
 }
 
 #[test]
-fn steering_of_a_bare_number_is_read_where_it_is_named() {
+fn steering_from_plain_numbers_is_read_if_named() {
     let fill = |bag: &mut TinyBag| {
         bag.twist("/twist", 10.0).float("/wheel", 0.1);
     };
@@ -256,7 +256,7 @@ fn the_documented_signals_are_read() {
 }
 
 #[test]
-fn a_signal_that_cannot_be_is_refused_by_its_field() {
+fn errors_name_the_field_of_an_invalid_signal() {
     let by_name = BY_DBC.replace("dbc = \"vehicle.dbc\"\n", "");
     let steering = INLINE_STEERING.replace("steering_rad = 0.0174533\n", "");
     for (sidecar, parts) in [
@@ -327,7 +327,7 @@ const CALIBRATION: &str = "%YAML:1.0\n---\n\
     distortion_coefficients: !!opencv-matrix\n   rows: 4\n   cols: 1\n   dt: d\n   data: [ -0.1, 0., 0., 0. ]\n";
 
 #[test]
-fn a_calibration_file_is_the_camera() {
+fn a_calibration_file_gives_the_camera() {
     let file = "calibration = \"sensors/camera.yaml\"\n";
     let drive = |image, sidecar: &str| {
         let drive = Drive::on(image, sidecar, |_| {});
@@ -364,7 +364,7 @@ fn a_calibration_file_is_the_camera() {
 /// The file beside a link takes precedence; otherwise the one beside its target is read.
 #[cfg(unix)]
 #[test]
-fn the_file_beside_a_link_counts() {
+fn the_file_beside_a_link_is_used() {
     use std::os::unix::fs::symlink;
     let drive = Drive::new("scenario = \"target\"\n", |bag| {
         bag.twist("/twist", 5.0);
@@ -432,7 +432,7 @@ fn a_bag_without_a_camera_is_left_out_of_a_folder_and_named() {
 
 /// Files with a bag's name that are not bags, before and after a good one, and the remains of another bag, without images.
 #[test]
-fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
+fn unreadable_bags_of_a_folder_are_listed_with_the_others() {
     let drive = Drive::new("", |bag| {
         bag.twist("/vehicle/twist", 10.0);
     });
@@ -482,7 +482,7 @@ fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
 }
 
 #[test]
-fn a_twist_s_speed_is_scaled_like_any_other() {
+fn a_twists_speed_is_scaled_like_any_other() {
     let sidecar = "[vehicle]\nspeed_scale = 0.9\n";
     // From a twist with a yaw rate, which is used as it is, and from one whose motion is fused.
     for yaw_rate in [0.2, 0.0] {
@@ -523,7 +523,7 @@ fn a_twist_without_a_yaw_rate_has_a_speed() {
 /// Rates give the rotation between two images, not the attitude: the integral since the bag's beginning, which grows with a bias or on a
 /// ramp, must not add roll in bends.
 #[test]
-fn rates_of_roll_and_pitch_tilt_a_pair_alone() {
+fn roll_and_pitch_rates_are_integrated_only_within_a_pair() {
     let drive = Drive::new("", |bag| {
         bag.tumbling_twist("/twist", 10.0, [0.0, 1.5, 1.0]);
     });
@@ -563,7 +563,7 @@ fn a_steering_angle_without_a_wheelbase_does_not_replace_a_yaw_rate() {
 
 /// If drivers leave the header's time at 0, all their messages would be at the same time, decades before the images.
 #[test]
-fn messages_without_a_time_have_that_of_their_recording() {
+fn messages_without_a_time_get_their_time_of_recording() {
     let sidecar = "[vehicle]\nwheelbase_m = 2.5\n";
     let drive = Drive::new(sidecar, |bag| {
         bag.without_stamps();
@@ -598,7 +598,7 @@ fn messages_without_a_time_have_that_of_their_recording() {
 
 /// The same for CAN frames.
 #[test]
-fn frames_of_the_bus_without_a_time_have_that_of_their_recording() {
+fn can_frames_without_a_time_get_their_time_of_recording() {
     let drive = Drive::new(INLINE, |bag| {
         bag.without_stamps().can("/can", &ten_mps());
     });
@@ -611,7 +611,7 @@ fn frames_of_the_bus_without_a_time_have_that_of_their_recording() {
 
 /// Unreadable parts are distinguished from oddities.
 #[test]
-fn damage_is_a_list_of_its_own_among_the_warnings() {
+fn damage_is_a_separate_list_among_the_warnings() {
     let drive = Drive::new("", |bag| {
         bag.without_stamps().twist("/twist", 10.0);
     });

@@ -40,7 +40,7 @@ fn convert(dataset: Dataset, out: &Path) {
 }
 
 #[test]
-fn one_that_fails_in_the_middle_leaves_nothing() {
+fn a_failed_conversion_leaves_nothing() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let dataset = drive(root);
@@ -65,7 +65,7 @@ fn one_that_fails_in_the_middle_leaves_nothing() {
 }
 
 #[test]
-fn what_a_killed_one_left_is_removed_and_what_another_writes_is_not() {
+fn the_remains_of_a_killed_conversion_are_removed_but_not_those_of_a_running_one() {
     let root = tempfile::tempdir().unwrap();
     let dataset = drive(&root.path().join("drive"));
     let out = root.path().join("kitti");
@@ -87,7 +87,7 @@ fn what_a_killed_one_left_is_removed_and_what_another_writes_is_not() {
 }
 
 #[test]
-fn one_that_is_stopped_leaves_nothing_unless_it_is_done() {
+fn a_stopped_conversion_leaves_nothing_unless_all_frames_are_done() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let dataset = drive(root);
@@ -136,7 +136,7 @@ fn kitti_of(dataset: &Dataset, out: &Path) -> Dataset {
 
 /// Packets have zeros for unmeasured values: without a mark, a copy of a drive without a yaw rate would go straight through every bend.
 #[test]
-fn what_was_not_measured_is_not_measured_in_the_copy() {
+fn unmeasured_values_stay_unknown_in_the_copy() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let folder = root.join("folder");
@@ -196,7 +196,7 @@ fn a_frame_without_a_time_has_none_in_the_copy() {
 
 /// Names such as 20240101120000.png: a line for every number would not fit on any disk.
 #[test]
-fn numbers_that_are_dates_are_counted_anew() {
+fn frames_with_dates_as_numbers_are_renumbered() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let names = ["20240101120000", "20240101120001", "20240101120007"];
@@ -225,7 +225,7 @@ fn numbers_that_are_dates_are_counted_anew() {
 
 /// An error must not name the temporary folder, which no longer exists.
 #[test]
-fn what_cannot_be_written_is_named_by_its_place() {
+fn write_errors_name_the_final_path() {
     let root = tempfile::tempdir().unwrap();
     let dataset = drive(&root.path().join("drive"));
     let out = root.path().join("kitti");
@@ -248,7 +248,7 @@ fn bag_of(dataset: &Dataset, out: &Path) -> Dataset {
 
 /// Frames on both sides of a pause are not neighbours, in a bag and in files with numbers.
 #[test]
-fn frames_that_a_bag_has_not_leave_out_their_numbers() {
+fn missing_frames_leave_out_their_numbers_in_a_bag() {
     let root = tempfile::tempdir().unwrap();
     let numbers: Vec<u64> = (0..5).chain(9..12).collect();
     let drive = TinyDrive {
@@ -270,7 +270,7 @@ fn frames_that_a_bag_has_not_leave_out_their_numbers() {
 
 /// An assumed mount must stay marked as assumed in a copy, or it would never be [aimed](Dataset::aim).
 #[test]
-fn a_place_of_the_camera_that_was_assumed_is_assumed_in_the_copy() {
+fn an_assumed_mount_stays_assumed_in_the_copy() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let folder = root.join("folder");

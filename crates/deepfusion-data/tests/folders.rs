@@ -85,7 +85,7 @@ fn a_kitti_drive_and_a_folder_of_it_give_the_same_snippets() {
 
 /// Image dates without a time zone only matter with a log, and if the first image's time is not given.
 #[test]
-fn a_zone_is_asked_for_where_it_matters() {
+fn a_missing_time_zone_gives_a_warning_only_if_it_matters() {
     let root = tempfile::tempdir().unwrap();
     write_drive(root.path(), 3, 8.0, 0.4);
     let at = |name: &str| root.path().join(name);
@@ -248,7 +248,7 @@ fn an_inspection_reports_streams_and_what_is_assumed() {
 }
 
 #[test]
-fn images_alone_open_and_say_why_they_cannot_train() {
+fn images_without_speeds_are_opened_but_cannot_be_trained_on() {
     let root = tempfile::tempdir().unwrap();
     for n in 0..4 {
         picture(n)
@@ -284,7 +284,7 @@ fn images_alone_open_and_say_why_they_cannot_train() {
 }
 
 #[test]
-fn a_camera_is_never_made_up() {
+fn a_camera_is_never_guessed() {
     let root = tempfile::tempdir().unwrap();
     write_images(root.path(), &["a", "b"]);
     let text = refusal(root.path());
@@ -334,7 +334,7 @@ fn a_calibration_of_another_size_is_refused() {
 }
 
 #[test]
-fn clocks_without_a_common_time_are_refused_and_can_be_joined() {
+fn times_that_do_not_overlap_are_refused_unless_start_s_joins_them() {
     let root = tempfile::tempdir().unwrap();
     write_drive(root.path(), 8, 10.0, 0.0);
     let speeds: String = (0..20)
@@ -365,7 +365,7 @@ fn clocks_without_a_common_time_are_refused_and_can_be_joined() {
 }
 
 #[test]
-fn depth_images_are_ground_truth_in_a_unit_that_is_said() {
+fn depth_images_are_ground_truth_in_the_given_unit() {
     let root = tempfile::tempdir().unwrap();
     write_drive(root.path(), 3, 10.0, 0.0);
     let depth = root.path().join("depth");
@@ -418,7 +418,7 @@ fn distorted_images_are_corrected_when_they_are_loaded() {
 }
 
 #[test]
-fn images_and_a_video_together_need_a_word() {
+fn images_and_a_video_together_need_a_choice() {
     let root = tempfile::tempdir().unwrap();
     write_drive(root.path(), 3, 10.0, 0.0);
     fs::write(root.path().join("drive.mp4"), "").unwrap();
@@ -457,7 +457,7 @@ fn a_split_selects_by_the_folders_name() {
 
 /// Other recordings in the folder of a recording are named in a warning, since they are not read.
 #[test]
-fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
+fn other_recordings_in_the_folder_are_named() {
     let root = tempfile::tempdir().unwrap();
     let at = root.path();
     write_drive(at, 4, 10.0, 0.0);

@@ -146,7 +146,7 @@ fn names(npz: &mut NpzReader<File>) -> Vec<String> {
 }
 
 #[test]
-fn several_drives_or_cameras_show_in_the_names() {
+fn names_include_drive_and_camera_if_there_are_several() {
     let root = tempfile::tempdir().unwrap();
     let tiny = TinyDrive {
         frames: vec![0, 1],
@@ -209,7 +209,7 @@ fn scans_are_exported_in_the_order_of_the_split() {
 }
 
 #[test]
-fn drives_of_one_name_keep_their_arrays_apart() {
+fn drives_with_the_same_name_get_different_array_names() {
     let root = tempfile::tempdir().unwrap();
     let tiny = TinyDrive {
         frames: vec![0],

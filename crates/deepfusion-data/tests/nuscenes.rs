@@ -124,7 +124,7 @@ fn write_scene(street: &Simulation, root: &Path) -> PathBuf {
 }
 
 #[test]
-fn a_scene_has_the_simulator_s_camera_motion_path_and_depth() {
+fn a_scene_has_the_simulators_camera_motion_path_and_depth() {
     let root = tempfile::tempdir().unwrap();
     let street = street(48, 24.0);
     let tables = write_scene(&street, root.path());
@@ -156,7 +156,7 @@ fn a_scene_has_the_simulator_s_camera_motion_path_and_depth() {
 }
 
 #[test]
-fn scenes_and_frames_whose_files_are_elsewhere_are_left_out() {
+fn scenes_and_frames_without_files_are_left_out() {
     let root = tempfile::tempdir().unwrap();
     write_scene(&street(16, 24.0), root.path());
     let frames = open(root.path()).unwrap()[0].frames().to_vec();
@@ -201,7 +201,7 @@ fn scenes_and_frames_whose_files_are_elsewhere_are_left_out() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_file_line_and_field() {
+fn errors_name_file_line_and_field() {
     let root = tempfile::tempdir().unwrap();
     let tables = write_scene(&street(4, 24.0), root.path());
     let unknown = "ffffffffffffffffffffffffffffffff".to_owned();

@@ -16,7 +16,7 @@ fn open(bag: &Path, topics: &[&str]) -> Result<Dataset, Error> {
 }
 
 #[test]
-fn each_camera_s_frames_are_its_own_by_name() {
+fn each_cameras_decoded_frames_have_their_own_folder() {
     if std::process::Command::new("ffmpeg")
         .arg("-version")
         .output()

@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn another_size_is_refused() {
+    fn images_of_another_size_are_refused() {
         let bent = Distortion::from_opencv(&[-0.2, 0.0, 0.0, 0.0]).unwrap();
         let lens = Lens::new(camera(), &bent).unwrap();
         assert!(lens.correct(RgbImage::new(79, 60)).is_err());
@@ -306,7 +306,7 @@ mod tests {
         /// The map takes a point's pixel in the corrected pinhole image to its pixel in the original image, and
         /// never points outside the original image.
         #[test]
-        fn corrected_pixels_see_their_rays(
+        fn corrected_pixels_map_to_their_rays_in_the_original(
             k1 in -0.2..0.3f64, k2 in -0.02..0.05f64, p1 in -0.003..0.003f64, p2 in -0.003..0.003f64,
             u in 0u32..80, v in 0u32..60,
         ) {

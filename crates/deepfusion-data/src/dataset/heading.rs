@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_camera_that_looks_down_heads_up_in_its_image() {
+    fn a_camera_looking_down_heads_for_a_point_above_its_axis() {
         let degrees = |up: f64, right: f64| Heading {
             off: Vector2::new(up.to_radians(), right.to_radians()),
             std_error: Vector2::new(0.002, 0.001),

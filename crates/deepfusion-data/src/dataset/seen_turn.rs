@@ -79,7 +79,7 @@ mod tests {
     /// An hour of weaving with roll and pitch, and a constant drift to one side: between any two images the track turns as
     /// observed, at its end as at its start.
     #[test]
-    fn the_track_turns_as_was_seen() {
+    fn the_track_has_the_observed_turns() {
         let wave = |i: usize, k: f64| (k * i as f64).sin();
         let turns: Vec<SeenTurn> = (0..36_000)
             .map(|i| SeenTurn {
@@ -106,7 +106,7 @@ mod tests {
 
     /// One missing pair is bridged. Two are a gap in the yaw, and count as level if the yaw is measured.
     #[test]
-    fn what_was_not_seen_is_not_made_up() {
+    fn longer_gaps_are_not_bridged() {
         let turn = |i: usize| SeenTurn {
             from_s: 2.0 * i as f64,
             to_s: 2.0 * (i + 1) as f64,

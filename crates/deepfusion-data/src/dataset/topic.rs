@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read_again() {
+    fn the_written_form_is_read_back() {
         for role in TopicRole::ALL {
             let text = format!("{role}=/a/b");
             let read: NamedTopic = text.parse().unwrap();

@@ -55,7 +55,7 @@ mod tests {
 
     /// One of each kind; all messages of a kind are tested in its own file.
     #[test]
-    fn a_warning_says_what_its_kind_says() {
+    fn a_warning_has_the_message_of_its_kind() {
         let ends_early = SourceDamage::new(std::io::Error::other("it ends early"));
         let warnings: [DataWarning; 7] = [
             CameraWarning::LensCorrected.into(),

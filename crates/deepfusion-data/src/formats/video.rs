@@ -312,7 +312,7 @@ mod tests {
 
     /// A minute of video whose recorder wrote local summer time, and logs in UTC.
     #[test]
-    fn local_time_beside_a_log_in_utc_is_warned_of() {
+    fn local_time_with_a_log_in_utc_gives_a_warning() {
         const S: i64 = 1_000_000_000;
         const H: i64 = 3600 * S;
         let day = 1_700_000_000 * S;
@@ -336,7 +336,7 @@ mod tests {
 
     /// A GoPro's clock may show UTC, which a short log can confirm.
     #[test]
-    fn a_gopro_is_warned_of_where_its_clock_may_show_another_zone() {
+    fn a_gopro_gives_a_warning_if_another_time_zone_is_possible() {
         const S: i64 = 1_000_000_000;
         const H: i64 = 3600 * S;
         let day = 1_700_000_000 * S;

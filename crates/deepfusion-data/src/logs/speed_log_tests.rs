@@ -193,7 +193,7 @@ fn slow_logs_are_bridged() {
 }
 
 #[test]
-fn a_track_stands_for_speeds() {
+fn a_gps_track_gives_speeds() {
     let point = |i: i32| {
         format!(
             "<trkpt lat=\"{:.7}\" lon=\"8.4\"><time>2026-05-01T12:00:{i:02}Z</time></trkpt>",
@@ -271,7 +271,7 @@ fn turning_unit(header: &str, rates: f64, accelerations: f64) -> String {
 }
 
 #[test]
-fn a_whole_inertial_unit_is_fused_with_the_speed() {
+fn a_complete_inertial_unit_is_fused_with_the_speed() {
     let mut speed = "time_s,speed_mps\n".to_owned();
     (0..=50).for_each(|i| speed += &format!("{},10\n", f64::from(i) * 0.1));
     let mount = "[vehicle_from_imu]\nrotation = [0.0, 0.0, 1.5707963]\n";
@@ -334,7 +334,7 @@ fn units_of_an_inertial_unit_are_never_guessed() {
 }
 
 #[test]
-fn the_course_of_positions_is_read_where_no_yaw_rate_is() {
+fn the_course_of_positions_is_read_only_without_a_yaw_rate() {
     let speed = ("speed.csv", "time_s,speed_mps\n0,10\n1,10\n");
     let course = ("course.csv", "time_s,course_rate_radps\n0,0.1\n1,0.2\n");
     let rates = |files: &[(&str, &str)]| {

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use std::fs;
 
 #[test]
-fn the_file_goes_before_the_frames_and_a_disagreement_is_reported() {
+fn the_file_takes_precedence_over_the_frames_and_a_disagreement_is_reported() {
     // The camera 1.5 m ahead and 1.2 m up.
     let place = [1.5, 0.0, 1.2];
     let frames = |bag: &mut TinyBag| {
@@ -44,7 +44,7 @@ fn the_file_goes_before_the_frames_and_a_disagreement_is_reported() {
 }
 
 #[test]
-fn the_frames_go_before_a_profile() {
+fn the_frames_take_precedence_over_a_profile() {
     let lidar = |bag: &mut TinyBag| {
         bag.within("lidar").scans("/points");
     };
@@ -116,7 +116,7 @@ fn two_parents_are_refused_with_both_chains() {
 }
 
 #[test]
-fn the_vehicles_frame_is_the_likeliest_and_of_two_the_file_says_which() {
+fn the_likeliest_vehicle_frame_is_used_and_the_file_decides_between_two() {
     // A rear axle takes precedence over base_link, wherever that is.
     let axle = Drive::new("", |bag| {
         bag.transforms("/tf_static", |_| {
@@ -199,7 +199,7 @@ fn a_camera_that_pans_has_no_mount() {
 /// A scan whose point is measured 40 ms after the time in its header, at 10 m/s; according to the file, its driver does not compensate for
 /// motion.
 #[test]
-fn a_point_with_a_time_of_its_own_is_brought_to_the_frame_from_there() {
+fn points_are_moved_to_the_frame_from_their_own_time() {
     let depth = |sidecar: &str, after_s: f32| {
         let drive = Drive::new(sidecar, |bag| {
             bag.within("lidar").timed_scans("/points", after_s);
@@ -225,7 +225,7 @@ fn a_point_with_a_time_of_its_own_is_brought_to_the_frame_from_there() {
 }
 
 #[test]
-fn a_frame_that_is_not_optical_is_reported_and_turned() {
+fn a_frame_that_is_not_optical_is_reported_and_rotated() {
     let drive = Drive::new("", |bag| {
         bag.within("lidar").scans("/points");
         bag.transforms("/tf_static", |_| {
@@ -256,7 +256,7 @@ fn a_frame_that_is_not_optical_is_reported_and_turned() {
 }
 
 #[test]
-fn frames_that_lead_nowhere_are_errors() {
+fn missing_frames_are_reported() {
     // The images' frame is in no transform.
     let missing = Drive::new("", |bag| {
         bag.transforms("/tf_static", |_| {
@@ -308,7 +308,7 @@ fn frames_that_lead_nowhere_are_errors() {
 }
 
 #[test]
-fn a_turned_inertial_unit_turns_the_vehicle_as_its_frame_says() {
+fn the_inertial_units_frame_corrects_its_orientation() {
     // Upside down: its z points down, so it measures the opposite rate, and gravity's reaction along -z.
     let upside_down = [std::f64::consts::PI, 0.0, 0.0];
     let drive = |frames: bool| {

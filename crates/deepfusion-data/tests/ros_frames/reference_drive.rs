@@ -110,6 +110,6 @@ fn a_drive_needs_no_file_beside_it() {
 
 #[cfg(feature = "ros2")]
 #[test]
-fn the_same_drive_of_ros_2_needs_none_either() {
+fn the_same_drive_in_ros_2_needs_no_file_either() {
     is_the_drive(&open(&reference("drive_ros2")).unwrap(), &facts());
 }

@@ -6,7 +6,7 @@ use crate::common::text_of;
 use deepfusion_data::{Dataset, Error, OpenOptions, write_bag_config};
 
 #[test]
-fn the_speeds_messages_are_read_and_positions_come_last() {
+fn speeds_in_messages_take_precedence_over_positions() {
     let speed = |fill: fn(&mut TinyBag)| {
         let dataset = Drive::bare(CAMERA, |bag| {
             bag.images("/image");
@@ -53,7 +53,7 @@ fn the_speeds_messages_are_read_and_positions_come_last() {
 }
 
 #[test]
-fn a_topic_is_named_by_a_caller() {
+fn callers_can_name_topics() {
     let drive = Drive::bare(
         "[vehicle]\nspeed_unit = \"km/h\"\n[topics]\nspeed = \"/speed\"\n",
         |bag| {
@@ -115,7 +115,7 @@ fn a_topic_is_named_by_a_caller() {
 
 /// `nmea_navsat_driver` and ublox write east and north instead of forward and left.
 #[test]
-fn a_receiver_s_velocity_to_east_and_north_is_no_speed_ahead() {
+fn a_receivers_velocity_in_world_axes_is_not_a_forward_speed() {
     let opened = |course: fn(u32) -> f64| {
         Drive::bare(CAMERA, |bag| {
             bag.images("/image").course_twist("/vel", 8.0, course);
@@ -138,7 +138,7 @@ fn a_receiver_s_velocity_to_east_and_north_is_no_speed_ahead() {
 
 /// ROS 2's controllers publish commands with stamps too.
 #[test]
-fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
+fn a_command_is_used_only_for_lack_of_a_measurement() {
     let sidecar = format!("{CAMERA}[vehicle]\nwheelbase_m = 2.5\n");
     let drive = |fill: fn(&mut TinyBag)| {
         Drive::bare(&sidecar, |bag| {
@@ -182,7 +182,7 @@ fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
 }
 
 #[test]
-fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
+fn an_unusable_inertial_unit_can_be_left_out() {
     let level = |fill: fn(&mut TinyBag)| {
         Drive::bare(CAMERA, |bag| {
             bag.images("/image")
@@ -250,7 +250,7 @@ fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
 }
 
 #[test]
-fn what_is_not_to_be_read_stays_so_in_the_file_that_is_written() {
+fn topics_set_to_none_stay_none_in_the_written_file() {
     let can = "[can]\nspeed_unit = \"km/h\"\n\
         speed = { id = 0x158, layout = { start_bit = 7, length = 16, byte_order = \"motorola\", scale = 0.01 } }\n";
     let drive = Drive::bare(&format!("{CAMERA}{can}"), |bag| {
@@ -271,7 +271,7 @@ fn what_is_not_to_be_read_stays_so_in_the_file_that_is_written() {
 
 /// FAST-LIO and others leave the twist of their odometry at 0.
 #[test]
-fn an_odometry_without_a_twist_moves_as_its_poses_do() {
+fn an_odometry_without_a_twist_gives_the_motion_of_its_poses() {
     let drive = |turned_rad: f64, scale: &str| {
         Drive::bare(&format!("{CAMERA}{scale}"), |bag| {
             bag.images("/image")
@@ -308,7 +308,7 @@ fn an_odometry_without_a_twist_moves_as_its_poses_do() {
 
 /// As with a GPX file beside a video, uncertain speeds have less weight in training.
 #[test]
-fn speeds_of_positions_say_how_sure_they_are() {
+fn speeds_from_positions_have_standard_deviations() {
     let opened = |scale: &str, positions: bool| {
         Drive::bare(&format!("{CAMERA}{scale}"), |bag| {
             bag.images("/image");

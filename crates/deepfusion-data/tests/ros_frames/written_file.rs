@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::fs;
 
 #[test]
-fn the_file_that_is_written_says_what_was_found() {
+fn the_written_file_has_what_was_found() {
     let folder = tempfile::tempdir().unwrap();
     let bag = folder.path().join("drive.bag");
     fs::copy(reference("drive.bag"), &bag).unwrap();
@@ -79,7 +79,7 @@ fn the_file_that_is_written_says_what_was_found() {
 }
 
 #[test]
-fn a_signal_makes_room_for_a_named_topic() {
+fn a_named_topic_replaces_a_signal() {
     let can = "[can]\nspeed_unit = \"km/h\"\n\
         speed = { id = 0x158, layout = { start_bit = 7, length = 16, byte_order = \"motorola\", scale = 0.01 } }\n";
     let drive = Drive::bare(&format!("{CAMERA}{can}"), |bag| {
@@ -112,7 +112,7 @@ fn a_signal_makes_room_for_a_named_topic() {
 }
 
 #[test]
-fn what_nobody_says_is_left_to_be_filled_in() {
+fn unknown_values_are_left_to_be_filled_in() {
     let drive = Drive::bare("", |bag| {
         bag.images("/image").twist("/speed", 10.0);
     });

@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_says_the_camera_is_named() {
+    fn messages_name_the_source_of_the_camera() {
         let by_exif = |action_camera, turned| CameraWarning::ByExif {
             image: "drive/images/000.jpg".into(),
             by: "26 mm in 35 mm film".into(),

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_passed_over_is_named_as_far_as_there_is_room() {
+    fn recordings_that_are_passed_over_are_listed_up_to_a_limit() {
         let said = |count| {
             let passed_over = IncompleteWarning::PassedOver {
                 folder: "drives".into(),
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_counted() {
+    fn messages_count_what_is_missing() {
         let no_images = |camera| IncompleteWarning::NoImages {
             camera,
             recordings: names(2),

@@ -213,7 +213,7 @@ mod tests {
     use deepfusion_logs::TableNote;
 
     #[test]
-    fn what_is_said_of_speeds() {
+    fn messages_about_speeds() {
         let log = || "speed.csv".to_owned();
         let topic = || "/gnss/fix".to_owned();
         for (warning, said) in [
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_of_turns() {
+    fn messages_about_turns() {
         let turns = |yaw_recorded, seen| MotionWarning::TurnsOfImages {
             yaw_recorded,
             seen,

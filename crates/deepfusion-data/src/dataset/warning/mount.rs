@@ -145,7 +145,7 @@ mod tests {
     use nalgebra::Vector2;
 
     #[test]
-    fn a_mount_that_is_not_given_is_said_to_be_taken() {
+    fn messages_about_assumed_mounts() {
         let heading = Heading {
             off: Vector2::new(2_f64.to_radians(), (-1_f64).to_radians()),
             std_error: Vector2::new(0.002, 0.001),
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn why_the_frames_do_not_say_a_mount_is_said() {
+    fn messages_say_why_frames_give_no_mount() {
         let config = PathBuf::from("drive.toml");
         let (from, to) = ("base_link".to_owned(), "camera".to_owned());
         for (why, said) in [

@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_times() {
+    fn messages_about_times() {
         let repeated = |rows| TimesWarning::Repeated {
             table: "speed.csv".into(),
             rows,

@@ -171,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rectified_is_a_word_of_the_topics_name() {
+    fn rectified_images_are_recognised_by_their_topic() {
         for topic in [
             "/camera/image_rect",
             "/camera/image_rect_color/compressed",
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn the_model_says_what_the_coefficients_are() {
+    fn the_distortion_model_determines_the_coefficients() {
         let d = [0.1, -0.02, 0.003, -0.0004];
         let k = Intrinsics::from_numbers([40.0, 41.0, 31.5, 23.5], (64, 48));
         let by = |distortion| Lens::new(k, &distortion).unwrap().intrinsics();

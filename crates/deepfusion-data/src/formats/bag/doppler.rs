@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sensor_s_velocity_comes_from_what_stands_still() {
+    fn the_sensors_velocity_is_estimated_from_static_points() {
         let truth = Vector3::new(9.0, -0.4, 0.05);
         for moving in [0.0, 0.2, 0.4] {
             let (xyz, radial) = scan(truth, moving);
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_made_of_nothing() {
+    fn too_few_or_invalid_points_give_no_velocity() {
         assert!(ego_velocity(&[], &[], None).is_none());
         let (xyz, _) = scan(Vector3::x(), 0.0);
         assert!(ego_velocity(&xyz, &vec![f32::NAN; xyz.len()], None).is_none());

@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_listed_point_is_the_nearest_within_a_centimetre() {
+    fn listed_points_match_the_nearest_within_a_centimetre() {
         let scan = [
             [5.0, 1.0, 0.0],
             [5.004, 1.0, 0.0],
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_in_other_axes_is_of_no_scan() {
+    fn a_list_in_other_axes_matches_no_scan() {
         let scan = [[5.0, 1.0, 0.0], [6.0, 1.0, 0.0]];
         assert!(!MatchedPoints::find(&scan, &[[1.0, 5.0, 0.0], [1.0, 6.0, 0.0]]).is_of_scan());
         assert!(MatchedPoints::find(&scan, &[]).is_of_scan());

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_position_is_left_out_and_gaps_are_bridged() {
+    fn invalid_positions_are_left_out_and_gaps_are_bridged() {
         let mut fixes = Fixes::default();
         for second in 0..20_i64 {
             // 10 m/s; without a position the receiver gives the origin, and once a number is missing.

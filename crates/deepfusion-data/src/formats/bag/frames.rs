@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_goes_up_and_down() {
+    fn chains_go_through_common_parents() {
         let quarter = std::f64::consts::FRAC_PI_2;
         let tree = frames(&[
             link("base", "/mast", 1.0, quarter),
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_is_no_mount() {
+    fn moving_frames_are_not_a_mount() {
         let tree = frames(&[
             link("odom", "base", 0.0, 0.0),
             link("base", "pan", 1.0, 0.0),

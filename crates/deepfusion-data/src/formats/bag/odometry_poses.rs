@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_that_go_along_their_x_are_a_drive() {
+    fn poses_give_speeds_only_if_their_x_points_along_the_path() {
         let path = Path::new("drive.bag");
         // To the north, with the x axis pointing north; the last pose has no orientation.
         let mut north = poses([0.0, 1.0, 0.0], [0.0, 0.0, 1.57]);

@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn times_of_points_as_drivers_write_them() {
+    fn point_times_are_read_in_the_units_of_drivers() {
         let near = |found: Option<Vec<f32>>, expected: [f32; 2]| {
             let found = found.unwrap();
             let is_near = |(a, b): (&f32, &f32)| (a - b).abs() < 1e-6;
@@ -90,7 +90,7 @@ mod tests {
 
     /// Many drivers fill invalid points with zeros, even if the others have dates.
     #[test]
-    fn rays_without_an_echo_need_no_times() {
+    fn invalid_points_need_no_times() {
         let numbers = [0.0, f64::INFINITY, 1_700_000_000.55, f64::NAN];
         let bytes = numbers.map(|number: f64| number.to_le_bytes().to_vec());
         let found = after(Datatype::Float64, &bytes, 2).unwrap();

@@ -213,7 +213,7 @@ mod tests {
 
     /// A ray without a return would otherwise be a point at the scanner's own position, which may be in the image.
     #[test]
-    fn a_ray_without_an_echo_is_no_depth() {
+    fn rays_without_a_return_give_no_depth() {
         let scan = Scan {
             xyz: vec![[0.0; 3], [f32::NAN; 3], [0.0, 0.0, 8.0]],
             ..Scan::default()
@@ -232,7 +232,7 @@ mod tests {
 
     /// A wall 10 m ahead, measured by a rotating scanner on its left before the frame and on its right after it, while driving at 10 m/s.
     #[test]
-    fn each_point_is_seen_from_where_it_was_measured() {
+    fn points_are_projected_from_the_pose_at_their_own_time() {
         let scan = Scan {
             xyz: vec![[-1.0, 0.0, 10.0], [1.0, 0.0, 10.0]],
             after_s: Some(vec![-0.05, 0.05]),

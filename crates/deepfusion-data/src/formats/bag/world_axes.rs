@@ -32,7 +32,7 @@ mod tests {
 
     /// A drive around a block at 10 m/s (north, west, south, east), and one mostly to the east.
     #[test]
-    fn a_course_is_not_taken_for_the_vehicle_s_axes() {
+    fn velocities_in_world_axes_are_recognised() {
         let to = |course: f64| (10.0 * course.cos(), 10.0 * course.sin());
         let block = (0..100).map(|i| to(f64::from(i / 25 + 1) * std::f64::consts::FRAC_PI_2));
         assert!(are_world_axes(block));
@@ -41,7 +41,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_goes_along_its_own_axes() {
+    fn velocities_in_the_vehicles_axes_are_not_mistaken() {
         // Bends at a point 1.5 m ahead of the axle, reversing, and speeds too low to have a direction.
         let bend = |i: i32| (8.0, 1.5 * 0.4 * f64::from(i % 3 - 1));
         assert!(!are_world_axes((0..99).map(bend)));

@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_is_where_the_file_puts_it() {
+    fn poses_and_sizes_are_read() {
         let read = parse(&file(&POSE.repeat(2), 2)).unwrap();
         let van = &read[0];
         assert_eq!((read.len(), van.object.as_str()), (1, "Van"));
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_its_place() {
+    fn errors_name_the_tracklet_pose_and_field() {
         let cases = [
             (
                 file(&POSE.replace("13.7", "NaN"), 1),

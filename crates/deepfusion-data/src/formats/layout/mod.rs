@@ -434,7 +434,7 @@ mod tests {
     }
 
     #[test]
-    fn what_dataset_toml_names_is_read() {
+    fn files_named_in_dataset_toml_are_not_other_recordings() {
         let root = tempfile::tempdir().unwrap();
         let at = root.path();
         write(
@@ -464,7 +464,7 @@ mod tests {
 
     /// In a folder whose settings apply to its subfolders.
     #[test]
-    fn outputs_in_a_fleet_are_no_recordings_and_what_is_deeper_is_said() {
+    fn outputs_are_not_recordings_and_deeper_folders_are_reported() {
         let root = tempfile::tempdir().unwrap();
         let at = root.path();
         let files = [
@@ -492,7 +492,7 @@ mod tests {
     }
 
     #[test]
-    fn the_folder_of_the_images_is_read() {
+    fn the_folder_of_images_is_not_another_recording() {
         let root = tempfile::tempdir().unwrap();
         let at = root.path();
         write(at, &["frames/0.png", "frames/0.mp4", "speed.csv"]);

@@ -74,7 +74,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn frames_go_to_the_users_cache_where_the_videos_folder_cannot_be_written() {
+    fn frames_are_kept_in_the_users_cache_if_the_videos_folder_is_not_writable() {
         let root = tempfile::tempdir().unwrap();
         let cache = root.path().join("cache");
         let there = root.path().join("drive.mp4");
@@ -99,7 +99,7 @@ mod tests {
     /// The folder must not change, or programs that watch it, to copy or index it, would start needlessly.
     #[cfg(unix)]
     #[test]
-    fn to_find_a_place_writes_nothing() {
+    fn choosing_a_folder_writes_nothing() {
         let root = tempfile::tempdir().unwrap();
         let folder = fs::File::open(root.path()).unwrap();
         let long_ago = std::time::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000_000);
@@ -111,7 +111,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_leads_to_where_the_frames_are_kept() {
+    fn a_link_to_a_folder_for_frames_is_followed() {
         use std::os::unix::fs::{PermissionsExt, symlink};
 
         let root = tempfile::tempdir().unwrap();
