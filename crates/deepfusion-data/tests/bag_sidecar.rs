@@ -84,7 +84,7 @@ fn near(found: f64, expected: f64) {
     assert!((found - expected).abs() < 1e-3, "{found}, not {expected}");
 }
 
-fn says(text: &str, parts: &[&str]) {
+fn assert_contains(text: &str, parts: &[&str]) {
     for part in parts {
         assert!(text.contains(part), "`{part}` is not in: {text}");
     }
@@ -111,7 +111,7 @@ fn no_topic_and_a_signal_do_not_contradict_each_other() {
     near(drive.speed(), 10.0);
     write_bag_config(&drive.bag, &OpenOptions::default(), true).unwrap();
     let written = fs::read_to_string(drive.bag.with_extension("toml")).unwrap();
-    says(&written, &["speed = \"none\"", "[can]"]);
+    assert_contains(&written, &["speed = \"none\"", "[can]"]);
     near(drive.speed(), 10.0);
     // The caller can leave out the signal too.
     let options = OpenOptions {
@@ -130,9 +130,9 @@ fn values_outside_a_signals_range_are_left_out() {
         bag.can("/can", &ten_mps());
     });
     near(drive.speed(), 10.0);
-    let said = text_of(open(&drive.bag).unwrap().warnings());
-    says(
-        &said,
+    let warnings = text_of(open(&drive.bag).unwrap().warnings());
+    assert_contains(
+        &warnings,
         &["can.speed: 25 values outside the signal's range left out"],
     );
 }
@@ -183,7 +183,7 @@ fn a_topic_and_a_signal_of_one_quantity_are_refused() {
             bag.can("/can", &ten_mps()).ackermann("/drive", 5.0, 0.1);
         });
         let (topic, signal) = (format!("topics.{key}"), format!("can.{key}"));
-        says(
+        assert_contains(
             &drive.refusal(),
             &["drive.toml", "/drive", &topic, &signal, "keep one of them"],
         );
@@ -217,7 +217,7 @@ fn the_speeds_topic_is_chosen_by_its_type() {
     let drive = Drive::new("", |bag| {
         bag.twist("/a", 5.0).twist("/b", 10.0);
     });
-    says(&drive.refusal(), &["/a, /b", "[topics] speed ="]);
+    assert_contains(&drive.refusal(), &["/a, /b", "[topics] speed ="]);
 }
 
 #[test]
@@ -299,8 +299,8 @@ fn errors_name_the_field_of_an_invalid_signal() {
             bag.can("/can", &ten_mps());
         });
         let refusal = drive.refusal();
-        says(&refusal, &["drive.toml"]);
-        says(&refusal, &parts);
+        assert_contains(&refusal, &["drive.toml"]);
+        assert_contains(&refusal, &parts);
     }
 }
 
@@ -309,7 +309,7 @@ fn a_bus_that_was_not_recorded_is_an_error() {
     let drive = Drive::new(INLINE, |bag| {
         bag.twist("/twist", 5.0);
     });
-    says(&drive.refusal(), &["can_msgs/Frame", "[can]", "drive.toml"]);
+    assert_contains(&drive.refusal(), &["can_msgs/Frame", "[can]", "drive.toml"]);
 }
 
 #[test]
@@ -319,7 +319,7 @@ fn a_signal_without_a_frame_is_an_error() {
     });
     let dataset = open(&drive.bag).unwrap();
     assert_eq!(dataset.frames()[12].speed_mps, None);
-    says(&text_of(dataset.warnings()), &["can.speed", "0x158"]);
+    assert_contains(&text_of(dataset.warnings()), &["can.speed", "0x158"]);
 }
 
 const CALIBRATION: &str = "%YAML:1.0\n---\n\
@@ -354,11 +354,11 @@ fn a_calibration_file_gives_the_camera() {
     assert_ne!(bent, flat);
 
     let rectified = drive("/camera/image_rect", file).refusal();
-    says(&rectified, &["camera.yaml", "`rect`", "topics.image"]);
+    assert_contains(&rectified, &["camera.yaml", "`rect`", "topics.image"]);
     let both = drive("/camera/image", &format!("{CAMERA}{file}")).refusal();
-    says(&both, &["drive.toml", "[camera] and calibration"]);
+    assert_contains(&both, &["drive.toml", "[camera] and calibration"]);
     let gone = drive("/camera/image", "calibration = \"gone.yaml\"\n").refusal();
-    says(&gone, &["drive.toml", "calibration", "gone.yaml"]);
+    assert_contains(&gone, &["drive.toml", "calibration", "gone.yaml"]);
 }
 
 /// The file beside a link takes precedence; otherwise the one beside its target is read.
@@ -459,8 +459,8 @@ fn unreadable_bags_of_a_folder_are_listed_with_the_others() {
         assert!(text.contains(part), "{part}: {text}");
     }
     let json = serde_json::to_value(&seen).unwrap();
-    let said = json["unreadable"][1]["error"].as_str().unwrap();
-    assert!(said.contains("z.bag: not a ROS bag"), "{said}");
+    let message = json["unreadable"][1]["error"].as_str().unwrap();
+    assert!(message.contains("z.bag: not a ROS bag"), "{message}");
 
     fs::remove_file(&drive.bag).unwrap();
     let none = inspect(at).unwrap();
@@ -495,7 +495,7 @@ fn a_twists_speed_is_scaled_like_any_other() {
     let wrong = Drive::new("[vehicle]\nspeed_scale = 3.6\n", |bag| {
         bag.twist("/twist", 10.0);
     });
-    says(
+    assert_contains(
         &wrong.refusal(),
         &["drive.toml", "vehicle.speed_scale is 3.6", "0.5 to 2"],
     );
@@ -509,15 +509,15 @@ fn a_twist_without_a_yaw_rate_has_a_speed() {
     });
     near(never.speed(), 10.0);
     assert!(!open(&never.bag).unwrap().yaw_known());
-    let now_and_then = Drive::new("", |bag| {
+    let sometimes = Drive::new("", |bag| {
         let gap = |t: f64| (t / 0.04).round() as i64 % 3 == 0;
         bag.turning_twist("/twist", move |t| {
             (10.0, if gap(t) { f64::NAN } else { 0.2 })
         });
     });
-    near(now_and_then.speed(), 10.0);
-    near(now_and_then.turn_rad(), 0.5 * 0.2);
-    assert!(open(&now_and_then.bag).unwrap().yaw_known());
+    near(sometimes.speed(), 10.0);
+    near(sometimes.turn_rad(), 0.5 * 0.2);
+    assert!(open(&sometimes.bag).unwrap().yaw_known());
 }
 
 /// Rates give the rotation between two images, not the attitude: the integral since the bag's beginning, which grows with a bias or on a
@@ -537,8 +537,8 @@ fn roll_and_pitch_rates_are_integrated_only_within_a_pair() {
     }
     // The same in a copy in KITTI's layout.
     let out = drive.folder.path().join("copy");
-    let whole = std::slice::from_ref(&dataset);
-    convert_to_kitti(whole, &out, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    let source = std::slice::from_ref(&dataset);
+    convert_to_kitti(source, &out, &mut |_, _| ControlFlow::Continue(())).unwrap();
     let copy = Dataset::open(&out, &OpenOptions::default())
         .unwrap()
         .remove(0);
@@ -581,7 +581,7 @@ fn messages_without_a_time_get_their_time_of_recording() {
     );
     let warnings = text_of(dataset.warnings());
     for topic in ["/twist", "/imu", "/drive"] {
-        says(
+        assert_contains(
             &warnings,
             &[&format!(
                 "{topic}: 25 messages have no time in their header"
@@ -603,7 +603,7 @@ fn can_frames_without_a_time_get_their_time_of_recording() {
         bag.without_stamps().can("/can", &ten_mps());
     });
     near(drive.speed(), 10.0);
-    says(
+    assert_contains(
         &text_of(open(&drive.bag).unwrap().warnings()),
         &["/can: 25 messages"],
     );
@@ -625,7 +625,7 @@ fn damage_is_a_separate_list_among_the_warnings() {
     let [damage] = cut.damage() else {
         panic!("{:?}", cut.damage());
     };
-    let said = damage.to_string();
-    assert!(said.starts_with("the bag is damaged: "), "{said}");
+    let message = damage.to_string();
+    assert!(message.starts_with("the bag is damaged: "), "{message}");
     assert!(cut.warnings().contains(damage), "{:?}", cut.warnings());
 }

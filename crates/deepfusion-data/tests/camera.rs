@@ -290,8 +290,8 @@ fn photographs_without_a_usable_focal_length_give_no_camera() {
         );
         let hint = error.hint().unwrap();
         assert!(hint.contains("hfov_deg = ") && hint.len() < 250, "{hint}");
-        let said = format!("{name}: no calibration of its camera");
-        assert!(error.to_string().ends_with(&said), "{error}");
+        let expected = format!("{name}: no calibration of its camera");
+        assert!(error.to_string().ends_with(&expected), "{error}");
     }
     // Different zooms, or two phones, in one folder.
     let folder = root.path().join("mixed");

@@ -45,7 +45,7 @@ fn a_failed_conversion_leaves_nothing() {
     let root = root.path();
     let dataset = drive(root);
     let image = root.join(DRIVE).join("image_02/data/0000000010.png");
-    let whole = fs::read(&image).unwrap();
+    let original = fs::read(&image).unwrap();
     fs::write(&image, "broken").unwrap();
     let (new, empty) = (root.join("new"), root.join("empty"));
     fs::create_dir(&empty).unwrap();
@@ -55,12 +55,12 @@ fn a_failed_conversion_leaves_nothing() {
             done.push(frames);
             ControlFlow::Continue(())
         });
-        let said = failed.unwrap_err().to_string();
-        assert!(said.contains("0000000010.png"), "{said}");
+        let message = failed.unwrap_err().to_string();
+        assert!(message.contains("0000000010.png"), "{message}");
         assert_eq!(done, [8], "it failed after its first frames");
     }
     assert!(!new.exists() && names(&empty).is_empty());
-    fs::write(&image, whole).unwrap();
+    fs::write(&image, original).unwrap();
     convert(dataset, &new);
 }
 
@@ -234,9 +234,9 @@ fn write_errors_name_the_final_path() {
         fs::remove_dir_all(out.join(aside.unwrap())).unwrap();
         ControlFlow::Continue(())
     });
-    let said = failed.unwrap_err().to_string();
-    assert!(said.contains("_drive_0001_sync"), "{said}");
-    assert!(!said.contains("partial"), "{said}");
+    let message = failed.unwrap_err().to_string();
+    assert!(message.contains("_drive_0001_sync"), "{message}");
+    assert!(!message.contains("partial"), "{message}");
 }
 
 fn bag_of(dataset: &Dataset, out: &Path) -> Dataset {
@@ -289,11 +289,13 @@ fn an_assumed_mount_stays_assumed_in_the_copy() {
             let (own, copied) = (dataset.cam_from_vehicle(), copy.cam_from_vehicle());
             let apart = own.unwrap().inverse() * copied.unwrap();
             assert!(apart.translation().norm() < 1e-9 && apart.angle() < 1e-9);
-            let said: Vec<String> = copy.warnings().iter().map(ToString::to_string).collect();
+            let warnings: Vec<String> = copy.warnings().iter().map(ToString::to_string).collect();
             assert_eq!(
-                said.iter().any(|w| w.contains("it looks straight ahead")),
+                warnings
+                    .iter()
+                    .any(|w| w.contains("it looks straight ahead")),
                 assumed,
-                "{said:?}"
+                "{warnings:?}"
             );
         }
     }

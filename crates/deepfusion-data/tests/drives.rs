@@ -65,8 +65,11 @@ fn drives_without_images_of_the_camera_are_left_out() {
     };
     let found = right().unwrap();
     assert_eq!(found.len(), 1);
-    let said = text_of(found[0].warnings());
-    assert!(said.contains("left out for lack of images: a"), "{said}");
+    let warnings = text_of(found[0].warnings());
+    assert!(
+        warnings.contains("left out for lack of images: a"),
+        "{warnings}"
+    );
     fs::remove_dir_all(fleet.path().join("b")).unwrap();
     let error = right().unwrap_err();
     assert!(matches!(error, Error::NoImages { .. }), "{error}");

@@ -95,13 +95,13 @@ fn a_missing_time_zone_gives_a_warning_only_if_it_matters() {
     let rows = "2011-09-26T13:04:32Z,8,0.1\n2011-09-26T13:04:33Z,8,0.1\n";
     let table = format!("time,speed_mps,yaw_rate_radps\n{rows}");
     fs::write(at("speed.csv"), table).unwrap();
-    let asks = || text_of(open(root.path()).warnings()).contains("timestamps.txt: its dates");
-    assert!(asks());
+    let warns = || text_of(open(root.path()).warnings()).contains("timestamps.txt: its dates");
+    assert!(warns());
     fs::write(at("dataset.toml"), "start_s = 1317042272.3\n").unwrap();
-    assert!(!asks(), "the first image's time is given");
+    assert!(!warns(), "the first image's time is given");
     fs::remove_file(at("dataset.toml")).unwrap();
     fs::remove_file(at("speed.csv")).unwrap();
-    assert!(!asks(), "there is no log");
+    assert!(!warns(), "there is no log");
 }
 
 /// KITTI's drive 0005 as a folder with tables made from its oxts: every pair's motion is the same except for the
@@ -469,12 +469,12 @@ fn other_recordings_in_the_folder_are_named() {
     for file in ["predict-1-of-1.manifest.json", "drive.mp4"] {
         fs::write(at.join("out").join(file), "").unwrap();
     }
-    let said = |path: &Path| {
+    let warning = |path: &Path| {
         let warnings = text_of(open(path).warnings());
         let about = warnings.lines().filter(|w| w.contains("not read"));
         about.collect::<Vec<_>>().join("\n")
     };
-    assert_eq!(said(at), "");
+    assert_eq!(warning(at), "");
     write_drive(&at.join("second"), 4, 10.0, 0.0);
     fs::create_dir(at.join("third")).unwrap();
     fs::write(at.join("third/clip.MP4"), "").unwrap();
@@ -482,22 +482,22 @@ fn other_recordings_in_the_folder_are_named() {
         "{} is read only as image folder; these in it look like recordings and are not read: second, third (",
         at.display()
     );
-    assert!(said(at).starts_with(&expected), "{}", said(at));
+    assert!(warning(at).starts_with(&expected), "{}", warning(at));
     let passed_over = open(at).passed_over().map(ToString::to_string);
-    assert_eq!(passed_over, Some(said(at)));
+    assert_eq!(passed_over, Some(warning(at)));
     let noted = text_of(&inspect(at).unwrap().drives[0].warnings);
-    assert!(noted.lines().any(|line| line == said(at)), "{noted}");
+    assert!(noted.lines().any(|line| line == warning(at)), "{noted}");
     // Given by its own path, there is no warning.
-    assert_eq!(said(&at.join("second")), "");
+    assert_eq!(warning(&at.join("second")), "");
 
     // KITTI drives, with a video of them; files within a drive belong to it.
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     write_drive(&drive.join("extra"), 4, 10.0, 0.0);
-    assert_eq!(said(root.path()), "");
+    assert_eq!(warning(root.path()), "");
     // A video with the name of an output.
     fs::write(root.path().join("drive_video.mp4"), "").unwrap();
-    assert_eq!(said(root.path()), "");
+    assert_eq!(warning(root.path()), "");
     let expected = |rest: &str| {
         format!(
             "{} is read only as KITTI raw; {rest}",
@@ -508,9 +508,9 @@ fn other_recordings_in_the_folder_are_named() {
     let one = expected(
         "this in it looks like a recording and is not read: drive.mp4 (give it by its own path)",
     );
-    assert_eq!(said(root.path()), one);
+    assert_eq!(warning(root.path()), one);
     write_drive(&root.path().join("walk"), 4, 10.0, 0.0);
     let both = expected("these in it look like recordings and are not read: drive.mp4, walk (");
-    assert!(said(root.path()).starts_with(&both));
-    assert_eq!(said(&drive), "");
+    assert!(warning(root.path()).starts_with(&both));
+    assert_eq!(warning(&drive), "");
 }

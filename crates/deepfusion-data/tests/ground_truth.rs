@@ -201,8 +201,8 @@ fn scans_are_exported_in_the_order_of_the_split() {
     let expected = lines.map(|(drive, frame)| format!("{drive}/{frame:010}"));
     assert_eq!(export(&datasets), expected);
     // Frames outside the split come after it.
-    let whole = open(&root.path().join("2030_01_02/a_sync"), Cameras::Left);
-    let mixed: Vec<Dataset> = whole.into_iter().chain(datasets).collect();
+    let outside = open(&root.path().join("2030_01_02/a_sync"), Cameras::Left);
+    let mixed: Vec<Dataset> = outside.into_iter().chain(datasets).collect();
     let names = export(&mixed);
     assert_eq!(names[..4], expected);
     assert_eq!(names[4..], ["a_sync/0000000000", "a_sync/0000000003"]);

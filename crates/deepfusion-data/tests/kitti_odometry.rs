@@ -120,8 +120,8 @@ fn a_sequence_has_the_simulators_camera_motion_path_and_depth() {
     );
     let json = serde_json::to_value(&seen).unwrap();
     assert_eq!(json["kind"], "kitti_odometry");
-    let said = common::text_of(&seen.drives[0].warnings);
-    assert!(said.contains("KITTI raw's calibration"), "{said}");
+    let warnings = common::text_of(&seen.drives[0].warnings);
+    assert!(warnings.contains("KITTI raw's calibration"), "{warnings}");
 }
 
 #[test]

@@ -151,8 +151,8 @@ fn a_scene_has_the_simulators_camera_motion_path_and_depth() {
     assert_eq!(serde_json::to_value(&seen).unwrap()["kind"], "nuscenes");
     let scans = seen.streams.iter().find(|s| s.name == "LIDAR_TOP").unwrap();
     assert!((scans.rate_hz.unwrap() - 12.0).abs() < 0.5);
-    let said = text_of(dataset.warnings());
-    assert!(!said.contains("missing"), "{said}");
+    let warnings = text_of(dataset.warnings());
+    assert!(!warnings.contains("missing"), "{warnings}");
 }
 
 #[test]
@@ -166,8 +166,8 @@ fn scenes_and_frames_without_files_are_left_out() {
     let numbers: Vec<u64> = keyframes.frames().iter().map(|f| f.number).collect();
     assert_eq!(numbers, [0, 6]);
     assert_eq!(keyframes.frames()[1].time_s, frames[6].time_s);
-    let said = text_of(keyframes.warnings());
-    assert!(said.contains("6 of 8 images are missing"), "{said}");
+    let warnings = text_of(keyframes.warnings());
+    assert!(warnings.contains("6 of 8 images are missing"), "{warnings}");
     assert!(
         keyframes
             .ground_truth(1, GtKind::Velodyne)

@@ -46,11 +46,11 @@ fn conversions_keep_the_simulated_mark() {
         })
         .unwrap();
         for path in [&bag, &kitti, &again] {
-            let said = (
+            let found = (
                 open(path)[0].is_simulated(),
                 Dataset::all_simulated_at(path),
             );
-            assert_eq!(said, (marked, marked), "{}", path.display());
+            assert_eq!(found, (marked, marked), "{}", path.display());
         }
     }
     assert!(!Dataset::all_simulated_at(&root.join("nowhere")));
@@ -103,7 +103,7 @@ fn a_bag_with_exact_motion_and_depth_is_simulated() {
         bag.twist("/truth/odometry", 5.0);
         bag.images("/truth/depth/compressed");
     };
-    for (topics, says, expected) in [
+    for (topics, setting, expected) in [
         (motion, "", false),
         (named, "", false),
         (both, "", true),
@@ -111,8 +111,8 @@ fn a_bag_with_exact_motion_and_depth_is_simulated() {
     ] {
         let root = tempfile::tempdir().unwrap();
         let bag = bag(root.path(), topics);
-        fs::write(bag.with_extension("toml"), format!("{says}{CAMERA}")).unwrap();
-        assert_eq!(open(&bag)[0].is_simulated(), expected, "{says}");
+        fs::write(bag.with_extension("toml"), format!("{setting}{CAMERA}")).unwrap();
+        assert_eq!(open(&bag)[0].is_simulated(), expected, "{setting}");
     }
 }
 
@@ -159,23 +159,23 @@ fn the_mark_is_read_from_the_file_of_each_layout() {
         (kitti, &[image, poses, masks], ".", own),
     ];
     let last = layouts.len() - 1;
-    for (number, (kind, files, path, says)) in layouts.into_iter().enumerate() {
+    for (number, (kind, files, path, config)) in layouts.into_iter().enumerate() {
         let root = tempfile::tempdir().unwrap();
         for file in files {
             let file = root.path().join(file);
             fs::create_dir_all(file.parent().unwrap()).unwrap();
             fs::write(file, "").unwrap();
         }
-        let (path, says) = (root.path().join(path), root.path().join(says));
+        let (path, config) = (root.path().join(path), root.path().join(config));
         assert_eq!(Dataset::kind_at(&path).unwrap(), kind);
         for (text, expected) in [
             ("", number == last),
             ("simulated = false\n", false),
             ("simulated = true\n", true),
         ] {
-            fs::write(&says, text).unwrap();
+            fs::write(&config, text).unwrap();
             let found = Dataset::all_simulated_at(&path);
-            assert_eq!(found, expected, "{kind:?} by {}: {text}", says.display());
+            assert_eq!(found, expected, "{kind:?} by {}: {text}", config.display());
         }
     }
 }

@@ -112,11 +112,11 @@ fn images_without_information_give_no_height() {
         pair.later = flat;
     }
     assert_eq!(implied_camera_height(&flat), None, "no texture");
-    let mut strangers = pairs(1.0);
-    for (i, pair) in strangers.iter_mut().enumerate() {
+    let mut unrelated = pairs(1.0);
+    for (i, pair) in unrelated.iter_mut().enumerate() {
         pair.earlier = Arc::new(RoadTexture::from(&render(1000.0 * (i + 1) as f64)));
     }
-    assert_eq!(implied_camera_height(&strangers), None, "two places");
+    assert_eq!(implied_camera_height(&unrelated), None, "two places");
     let mut up = pairs(1.0);
     up.iter_mut().for_each(|p| p.down_in_cam = -Vector3::y());
     assert_eq!(

@@ -118,8 +118,8 @@ fn a_gopros_camera_is_known_only_with_the_linear_lens() {
                 "{k:?}"
             );
             assert!(!found.camera_assumed());
-            let said = text_of(found.warnings());
-            assert!(said.contains("linear lens of a HERO11 Black"), "{said}");
+            let text = text_of(found.warnings());
+            assert!(text.contains("linear lens of a HERO11 Black"), "{text}");
             assert!(!bends(&given[0]));
             // A given camera takes precedence.
             assert!((given[0].intrinsics(0).fx - 32.0 / 30_f64.to_radians().tan()).abs() < 1e-6);
@@ -310,7 +310,7 @@ fn images_are_written_as_a_video_with_their_own_times() {
     let before = fs::read(folder.join("drive.mp4")).unwrap();
     for broken in [0, 2] {
         let path = folder.join(&shown[broken].file);
-        let whole = fs::read(&path).unwrap();
+        let original = fs::read(&path).unwrap();
         fs::write(&path, "no picture").unwrap();
         for name in ["drive.mp4", "other.mp4"] {
             let error = made(name).unwrap_err();
@@ -319,7 +319,7 @@ fn images_are_written_as_a_video_with_their_own_times() {
         fs::remove_file(&path).unwrap();
         let error = made("other.mp4").unwrap_err();
         assert!(error.to_string().contains(&shown[broken].file), "{error}");
-        fs::write(&path, whole).unwrap();
+        fs::write(&path, original).unwrap();
     }
     assert_eq!(fs::read(folder.join("drive.mp4")).unwrap(), before);
     let names = fs::read_dir(&folder)

@@ -67,13 +67,13 @@ mod tests {
         };
         let ahead = degrees(2.0, -1.0).turn().rotate(&Vector3::z());
         assert!(ahead.y < -0.03 && ahead.x < -0.01, "up and left: {ahead}");
-        let said = degrees(2.0, -1.0).to_string();
-        assert!(said.contains("2.0 ± 0.1 degrees down and 1.0 ± 0.1 degrees to the right"));
+        let text = degrees(2.0, -1.0).to_string();
+        assert!(text.contains("2.0 ± 0.1 degrees down and 1.0 ± 0.1 degrees to the right"));
         assert!(degrees(2.0, 1.0).is_sure() && !degrees(9.0, 9.0).is_sure());
-        let vague = Heading {
+        let uncertain = Heading {
             std_error: Vector2::new(0.02, 0.001),
             ..degrees(2.0, 1.0)
         };
-        assert!(!vague.is_sure());
+        assert!(!uncertain.is_sure());
     }
 }

@@ -126,7 +126,7 @@ mod tests {
         let tilt = |from_s: f64| measured.motion(from_s, from_s + 2.0).unwrap().tilt_rad;
         assert!((tilt(2.0)[1] - 0.02).abs() < 1e-3);
         assert_eq!(tilt(12.0), [0.0; 2]);
-        let said = warning(&seen, 11, false).to_string();
-        assert!(said.contains("(6 of 10 pairs)"), "{said}");
+        let message = warning(&seen, 11, false).to_string();
+        assert!(message.contains("(6 of 10 pairs)"), "{message}");
     }
 }

@@ -318,18 +318,21 @@ mod tests {
         let day = 1_700_000_000 * S;
         let (half_an_hour, five_hours) = ((day, day + H / 2), (day, day + 5 * H));
         let times = [Some(0), Some(60 * S)];
-        let said = |created: i64, log: (i64, i64), gopro: Option<&str>| {
+        let warning = |created: i64, log: (i64, i64), gopro: Option<&str>| {
             zone_warning(created, &times, log, gopro.map(str::to_owned))
         };
         let began = day + 60 * S;
         let beside = |moved_ns| Some(TimesWarning::VideoBesideLog { moved_ns });
-        assert_eq!(said(began, half_an_hour, None), None);
-        assert_eq!(said(began + 2 * H, half_an_hour, None), beside(Some(began)));
+        assert_eq!(warning(began, half_an_hour, None), None);
+        assert_eq!(
+            warning(began + 2 * H, half_an_hour, None),
+            beside(Some(began))
+        );
         let in_india = began + 5 * H + H / 2;
-        assert_eq!(said(in_india, half_an_hour, None), beside(Some(began)));
-        assert_eq!(said(day - 9 * 24 * H, half_an_hour, None), beside(None));
+        assert_eq!(warning(in_india, half_an_hour, None), beside(Some(began)));
+        assert_eq!(warning(day - 9 * 24 * H, half_an_hour, None), beside(None));
         // Several time zones put the video within a long log, and none is likelier.
-        assert_eq!(said(began + 6 * H, five_hours, None), beside(None));
+        assert_eq!(warning(began + 6 * H, five_hours, None), beside(None));
         // A video of a single frame can be within its log too.
         assert_eq!(zone_warning(day, &[Some(0)], half_an_hour, None), None);
     }
@@ -341,14 +344,14 @@ mod tests {
         const H: i64 = 3600 * S;
         let day = 1_700_000_000 * S;
         let times = [Some(0), Some(60 * S)];
-        let said = |log| zone_warning(day + 60 * S, &times, log, Some("HERO11 Black".into()));
+        let warning = |log| zone_warning(day + 60 * S, &times, log, Some("HERO11 Black".into()));
         let model = "HERO11 Black".to_owned();
         let recorder = TimesWarning::LocalRecorder { model };
-        assert_eq!(said((day, day + H / 2)), None);
-        assert_eq!(said((day, day + 4 * H)), Some(recorder.clone()));
+        assert_eq!(warning((day, day + H / 2)), None);
+        assert_eq!(warning((day, day + 4 * H)), Some(recorder.clone()));
         // In the zone one hour off, first more, then less of it is within the log.
-        assert_eq!(said((day + 90 * S, day + 2 * H)), Some(recorder));
-        assert_eq!(said((day, day + H + 30 * S)), None);
+        assert_eq!(warning((day + 90 * S, day + 2 * H)), Some(recorder));
+        assert_eq!(warning((day, day + H + 30 * S)), None);
     }
 
     /// A minute of video, with the date that each of the two kinds of recorders writes.

@@ -1,6 +1,6 @@
 //! The file beside a bag, written from what was found.
 
-use super::common::{Drive, camera, open, open_with, reference, says};
+use super::common::{Drive, assert_contains, camera, open, open_with, reference};
 use crate::common::bag::CAMERA;
 use deepfusion_data::{Dataset, Error, OpenOptions, write_bag_config};
 use nalgebra::{Matrix3, Vector3};
@@ -15,7 +15,7 @@ fn the_written_file_has_what_was_found() {
     let written = write_bag_config(&bag, &OpenOptions::default(), false).unwrap();
     assert_eq!(written, [bag.with_extension("toml")]);
     let text = fs::read_to_string(&written[0]).unwrap();
-    says(
+    assert_contains(
         &text,
         &[
             "image = \"/camera/front/image_raw/compressed\"   # sensor_msgs/CompressedImage, 51 messages",
@@ -60,7 +60,7 @@ fn the_written_file_has_what_was_found() {
     };
     write_bag_config(&bag, &options, true).unwrap();
     let text = fs::read_to_string(&written[0]).unwrap();
-    says(
+    assert_contains(
         &text,
         &[
             "scenario = \"urban\"",
@@ -122,7 +122,7 @@ fn unknown_values_are_left_to_be_filled_in() {
     };
     let written = write_bag_config(&drive.bag, &options, false).unwrap();
     let text = fs::read_to_string(&written[0]).unwrap();
-    says(&text, &["# [cam_from_vehicle]", "[camera]"]);
+    assert_contains(&text, &["# [cam_from_vehicle]", "[camera]"]);
     // The given camera is kept, and the commented lines are a valid transform once uncommented.
     assert_eq!(drive.opened().intrinsics(0).fx, 60.0);
     let (head, place) = text.split_once("# [cam_from_vehicle]").unwrap();

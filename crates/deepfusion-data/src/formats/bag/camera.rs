@@ -139,7 +139,7 @@ fn of_camera_info(
 ) -> std::result::Result<(Intrinsics, Distortion), CameraInfoProblem> {
     let size = match (info.width, info.height) {
         (0, 0) => image_size,
-        said => said,
+        stated => stated,
     };
     let of = |fx, fy, cx, cy| Intrinsics::from_numbers([fx, fy, cx, cy], size);
     if rectified && info.p[0] > 0.0 {

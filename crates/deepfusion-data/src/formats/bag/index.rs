@@ -332,9 +332,9 @@ impl Index {
                 }
                 TopicRole::Can => {
                     let frame: Frame = message.decode()?;
-                    let said = can.read(&frame, at_ns);
-                    self.speed_mps.extend(said.speed_mps);
-                    self.steering_rad.extend(said.steering_rad);
+                    let values = can.read(&frame, at_ns);
+                    self.speed_mps.extend(values.speed_mps);
+                    self.steering_rad.extend(values.steering_rad);
                 }
                 TopicRole::Truth => {
                     let odometry: Odometry = message.decode()?;

@@ -183,16 +183,16 @@ impl OpenTracklet {
 
     fn take(&mut self) -> Result<Tracklet, TrackletsProblem> {
         let open = std::mem::take(self);
-        let count = there(open.announced, "poses")?;
+        let count = required(open.announced, "poses")?;
         enough(count, open.poses.len(), TrackletPart::Poses)?;
         Ok(Tracklet {
-            object: there(open.object, "objectType")?,
+            object: required(open.object, "objectType")?,
             size_m: [
-                there(open.length, "l")?,
-                there(open.width, "w")?,
-                there(open.height, "h")?,
+                required(open.length, "l")?,
+                required(open.width, "w")?,
+                required(open.height, "h")?,
             ],
-            first_frame: there(open.first_frame, "first_frame")?,
+            first_frame: required(open.first_frame, "first_frame")?,
             poses: open.poses,
         })
     }
@@ -215,16 +215,16 @@ impl OpenPose {
         let open = std::mem::take(self);
         Ok(TrackletPose {
             bottom_m: Vector3::new(
-                there(open.tx, "tx")?,
-                there(open.ty, "ty")?,
-                there(open.tz, "tz")?,
+                required(open.tx, "tx")?,
+                required(open.ty, "ty")?,
+                required(open.tz, "tz")?,
             ),
-            yaw_rad: there(open.rz, "rz")?,
+            yaw_rad: required(open.rz, "rz")?,
         })
     }
 }
 
-fn there<T>(part: Option<T>, element: &'static str) -> Result<T, TrackletsProblem> {
+fn required<T>(part: Option<T>, element: &'static str) -> Result<T, TrackletsProblem> {
     part.ok_or(TrackletsProblem::Lacks { element })
 }
 

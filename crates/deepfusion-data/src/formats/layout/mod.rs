@@ -329,7 +329,7 @@ impl Layout {
                 let apart = |(folder, layout): (PathBuf, Self)| layout.apart(&folder);
                 all.into_iter().flat_map(apart).collect()
             }
-            whole => vec![(path.to_owned(), whole)],
+            single => vec![(path.to_owned(), single)],
         }
     }
 
@@ -401,8 +401,8 @@ fn each<T>(
     place: impl Fn(&T) -> PathBuf,
     layout: impl Fn(Vec<T>) -> Layout,
 ) -> Vec<(PathBuf, Layout)> {
-    let alone = |one: T| (place(&one), layout(vec![one]));
-    all.into_iter().map(alone).collect()
+    let single = |one: T| (place(&one), layout(vec![one]));
+    all.into_iter().map(single).collect()
 }
 
 /// The path as given, with unresolved links, since a bag's file may be beside the link; the resolved path if the given
@@ -487,8 +487,8 @@ mod tests {
         assert_eq!(names, ["monday", "tuesday"]);
         assert_eq!(passed_over(at), None);
         write(at, &["week/monday/0.png", "week/dataset.toml"]);
-        let said = passed_over(at).unwrap();
-        assert!(said.contains("and is not read: week"), "{said}");
+        let message = passed_over(at).unwrap();
+        assert!(message.contains("and is not read: week"), "{message}");
     }
 
     #[test]

@@ -77,8 +77,8 @@ mod tests {
     fn frames_are_kept_in_the_users_cache_if_the_videos_folder_is_not_writable() {
         let root = tempfile::tempdir().unwrap();
         let cache = root.path().join("cache");
-        let there = root.path().join("drive.mp4");
-        let found = folder_for_frames(&there, Some(cache.clone())).unwrap();
+        let video = root.path().join("drive.mp4");
+        let found = folder_for_frames(&video, Some(cache.clone())).unwrap();
         assert_eq!(found, root.path());
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 0);
 
