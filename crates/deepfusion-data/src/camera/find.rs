@@ -23,7 +23,7 @@ const NAMES: [&str; 8] = [
 ];
 
 /// KITTI raw's calibration file, which lies above the drives.
-const OF_A_DATE: &str = "calib_cam_to_cam.txt";
+const KITTI_RAW: &str = "calib_cam_to_cam.txt";
 
 /// The path of a calibration file beside an image, in the folder above or, for KITTI, some folders further up. The file is not read.
 #[must_use]
@@ -32,7 +32,7 @@ pub fn calibration_near(image: &Path) -> Option<PathBuf> {
     let folders = image.ancestors().skip(1).take(5).enumerate();
     let mut files = folders.flat_map(|(above, folder)| {
         let beside = if above < 2 { &NAMES[..] } else { &[] };
-        let names = beside.iter().chain([&OF_A_DATE]);
+        let names = beside.iter().chain([&KITTI_RAW]);
         names.map(|name| folder.join(name)).collect::<Vec<_>>()
     });
     files.find(|file| file.is_file())

@@ -161,7 +161,7 @@ fn resized(depth: DepthMap, width: usize, height: usize) -> DepthMap {
 }
 
 /// Largest extent to each side of a pinhole image from a fisheye lens: tan 60°.
-const WIDEST: f64 = 1.732_050_807_568_877_2;
+const MAX_TAN: f64 = 1.732_050_807_568_877_2;
 
 /// The pinhole camera that sees the largest rectangle of rays that are all in the image.
 fn largest_valid(
@@ -184,13 +184,13 @@ fn largest_valid(
         // A border pixel without a ray is at least 90 degrees from the axis, far outside the widest image.
         let limit = |side: Option<f64>, widest: f64| {
             let side = side.unwrap_or(widest);
-            Some(if side.abs() > WIDEST { widest } else { side })
+            Some(if side.abs() > MAX_TAN { widest } else { side })
         };
         [
-            limit(left_x, -WIDEST),
-            limit(top_y, -WIDEST),
-            limit(right_x, WIDEST),
-            limit(bottom_y, WIDEST),
+            limit(left_x, -MAX_TAN),
+            limit(top_y, -MAX_TAN),
+            limit(right_x, MAX_TAN),
+            limit(bottom_y, MAX_TAN),
         ]
     } else {
         [left_x, top_y, right_x, bottom_y]

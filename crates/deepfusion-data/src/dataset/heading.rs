@@ -8,9 +8,9 @@ use nalgebra::{Vector2, Vector3};
 use std::fmt;
 
 /// Largest standard error of a heading that is used, radians: a quarter of a degree.
-const SURE: f64 = 0.0044;
+const MAX_STD_ERROR: f64 = 0.0044;
 /// Largest offset of a heading that is used, radians: ten degrees. A larger one has another cause.
-const MOST: f64 = 0.175;
+const MAX_OFFSET: f64 = 0.175;
 
 /// Difference between the direction of travel in the images and that according to the mount.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +25,7 @@ impl Heading {
     /// Whether it can be used to correct the mount: its standard errors are at most a quarter of a degree, and it is at most ten degrees.
     #[must_use]
     pub fn is_sure(&self) -> bool {
-        self.std_error.iter().all(|error| *error <= SURE) && self.off.norm() <= MOST
+        self.std_error.iter().all(|error| *error <= MAX_STD_ERROR) && self.off.norm() <= MAX_OFFSET
     }
 
     /// The rotation from the camera according to the mount to the true camera.

@@ -81,9 +81,12 @@ fn of_camera(camera: Option<u8>) -> String {
 
 fn passed_over(folder: &Path, layout: DatasetKind, recordings: &[String]) -> String {
     /// How many names are listed.
-    const MOST: usize = 6;
-    let listed = recordings.get(..MOST).unwrap_or(recordings).join(", ");
-    let more = match recordings.len().checked_sub(MOST) {
+    const MAX_LISTED: usize = 6;
+    let listed = recordings
+        .get(..MAX_LISTED)
+        .unwrap_or(recordings)
+        .join(", ");
+    let more = match recordings.len().checked_sub(MAX_LISTED) {
         None | Some(0) => String::new(),
         Some(more) => format!(" and {more} more"),
     };

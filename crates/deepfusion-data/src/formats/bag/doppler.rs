@@ -13,9 +13,9 @@ const INLIER_MPS: f64 = 0.3;
 /// Rounds of reweighting.
 const ROUNDS: usize = 12;
 /// Fewest points for an estimate.
-const LEAST_POINTS: usize = 30;
+const MIN_POINTS: usize = 30;
 /// Most points used: all 10⁵ points of a scan give no better estimate than every tenth.
-const ENOUGH_POINTS: usize = 8000;
+const MAX_POINTS: usize = 8000;
 
 /// The sensor's own velocity, estimated from its scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +42,7 @@ pub fn ego_velocity(
     radial: &[f32],
     start: Option<Vector3<f64>>,
 ) -> Option<DopplerEgo> {
-    let step = (xyz.len() / ENOUGH_POINTS).max(1);
+    let step = (xyz.len() / MAX_POINTS).max(1);
     let rays: Vec<(Vector3<f64>, f64)> = xyz
         .iter()
         .zip(radial)
@@ -50,7 +50,7 @@ pub fn ego_velocity(
         .filter_map(|(point, radial)| ray(point).map(|d| (d, f64::from(*radial))))
         .filter(|(_, radial)| radial.is_finite())
         .collect();
-    if rays.len() < LEAST_POINTS {
+    if rays.len() < MIN_POINTS {
         return None;
     }
     let prior = start.unwrap_or_default();

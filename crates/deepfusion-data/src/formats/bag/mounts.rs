@@ -137,8 +137,8 @@ impl Search<'_> {
             }
             (None, MountByFrames::Found(by_frames, chain)) => {
                 if let Some(profile) = profile {
-                    let who = format!("the profile {of_profile}");
-                    self.compare(name, (&by_frames, &chain), (&profile, &who));
+                    let source = format!("the profile {of_profile}");
+                    self.compare(name, (&by_frames, &chain), (&profile, &source));
                 }
                 (by_frames, chain)
             }

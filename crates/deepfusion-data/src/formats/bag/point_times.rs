@@ -4,7 +4,7 @@ use crate::logs::clock::{TimeUnit, seconds};
 use deepfusion_rosbag::msg::{Column, Datatype};
 
 /// Largest time between a point and its scan, in seconds.
-const FARTHEST_S: f64 = 1.0;
+const MAX_AFTER_S: f64 = 1.0;
 
 /// The points' times in seconds after the scan's own time, which is `scan_ns` after 1970. The numbers may be dates in any unit, or count
 /// from the scan's time: integers in nanoseconds, like Ouster's `t`, others in seconds, like Velodyne's `time`. Points that are invalid
@@ -33,7 +33,7 @@ pub(super) fn seconds_after(
         }
     });
     let after: Vec<f64> = after.collect();
-    let is_near = after.iter().all(|s| s.abs() <= FARTHEST_S);
+    let is_near = after.iter().all(|s| s.abs() <= MAX_AFTER_S);
     is_near.then(|| after.iter().map(|s| *s as f32).collect())
 }
 

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 fn umad(own: &str) -> BagConfig {
     let own = toml::from_str(own).unwrap();
-    BagConfig::over_profile(own, "umad").unwrap().unwrap()
+    BagConfig::with_profile(own, "umad").unwrap().unwrap()
 }
 
 /// Each profile is a valid file beside a bag, and names no files.
@@ -39,5 +39,5 @@ fn the_bags_file_takes_precedence_over_the_profile() {
     // CameraInfo takes precedence over the profile's camera, the file's own camera over CameraInfo.
     assert!(config.camera.is_none());
     assert_eq!(config.profile_camera.unwrap().cy, 117.60);
-    assert!(BagConfig::over_profile(Table::new(), "kitti").is_none());
+    assert!(BagConfig::with_profile(Table::new(), "kitti").is_none());
 }

@@ -21,7 +21,7 @@ const VELOCITY_NAMES: [&str; 6] = [
     "v",
 ];
 /// If a smaller fraction of a scan's points agrees with its estimated velocity, the vehicle's is used instead.
-pub(super) const LEAST_STATIC: f64 = 0.4;
+pub(super) const MIN_STATIC: f64 = 0.4;
 /// Points within this time share a pose, in seconds: at 50 m/s, the error is at most 5 mm.
 const STEP_S: f64 = 1e-4;
 
@@ -157,7 +157,7 @@ impl Scan {
             return Some(radial.clone());
         }
         let by_scan = ego_velocity(&self.xyz, radial, vehicle)
-            .filter(|ego| ego.static_share >= LEAST_STATIC)
+            .filter(|ego| ego.static_share >= MIN_STATIC)
             .map(|ego| ego.velocity);
         let velocity = by_scan.or(vehicle)?;
         Some(ground_radial(&self.xyz, radial, &velocity))

@@ -1,7 +1,7 @@
 //! Recognises velocities in world axes: a GPS receiver's, to the east and to the north, in the same message type as the vehicle's own.
 
 /// Below this speed, the direction is unreliable, m/s.
-const LEAST_MPS: f64 = 2.0;
+const MIN_SPEED_MPS: f64 = 2.0;
 /// Lateral velocity / speed: 17° off the vehicle's x, which never occurs at the rear axle, and ahead of it only in tight bends.
 const ACROSS: f64 = 0.3;
 
@@ -14,7 +14,7 @@ const FAR_ACROSS: f64 = 0.7;
 pub(super) fn are_world_axes(velocities: impl Iterator<Item = (f64, f64)>) -> bool {
     let across = velocities.filter_map(|(x, y)| {
         let speed = x.hypot(y);
-        (speed > LEAST_MPS).then(|| y.abs() / speed)
+        (speed > MIN_SPEED_MPS).then(|| y.abs() / speed)
     });
     let mut across: Vec<f64> = across.collect();
     across.sort_by(f64::total_cmp);

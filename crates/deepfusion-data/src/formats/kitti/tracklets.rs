@@ -229,13 +229,17 @@ fn required<T>(part: Option<T>, element: &'static str) -> Result<T, TrackletsPro
 }
 
 fn number<T: std::str::FromStr>(text: &str) -> Result<T, TrackletsProblem> {
-    let problem = |_| TrackletsProblem::NotACount { text: shown(text) };
+    let problem = |_| TrackletsProblem::NotACount {
+        text: shortened(text),
+    };
     text.trim().parse().map_err(problem)
 }
 
 fn finite(text: &str) -> Result<f64, TrackletsProblem> {
     let value: Option<f64> = text.trim().parse().ok().filter(|v: &f64| v.is_finite());
-    value.ok_or_else(|| TrackletsProblem::NotANumber { text: shown(text) })
+    value.ok_or_else(|| TrackletsProblem::NotANumber {
+        text: shortened(text),
+    })
 }
 
 fn length(text: &str) -> Result<f64, TrackletsProblem> {
@@ -246,7 +250,7 @@ fn length(text: &str) -> Result<f64, TrackletsProblem> {
 }
 
 /// A text, shortened for a message.
-fn shown(text: &str) -> String {
+fn shortened(text: &str) -> String {
     text.trim().chars().take(40).collect()
 }
 

@@ -14,7 +14,7 @@ use crate::{
 };
 use deepfusion_rosbag::MessageSource;
 use deepfusion_video::is_video;
-use neighbours::{NeighbourSearch, holds_outputs, unread};
+use neighbours::{NeighbourSearch, contains_outputs, unread};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -53,7 +53,7 @@ impl Dataset {
     /// it; for a bag, only the file beside it counts. `false` if there is no recording.
     #[must_use]
     pub fn all_simulated_at(path: &Path) -> bool {
-        Layout::of(path).is_ok_and(|layout| layout.says_simulated())
+        Layout::of(path).is_ok_and(|layout| layout.marked_as_simulated())
     }
 
     /// Opens a recording of messages, such as a bag in another format, like [`Self::open`] opens a bag: topics are found
@@ -96,7 +96,7 @@ impl Layout {
         if FolderConfig::read_for_folders(path)?.is_some() {
             let mut found = Vec::new();
             // Skip predictions and decoded frames, which are images too.
-            for folder in recordings.iter().filter(|folder| !holds_outputs(folder)) {
+            for folder in recordings.iter().filter(|folder| !contains_outputs(folder)) {
                 // An invalid recording is an error, not silently left out.
                 found.extend(Self::known(folder)?.map(|layout| (folder.clone(), layout)));
             }
@@ -209,16 +209,17 @@ impl Layout {
     }
 
     /// Whether the files beside the images mark every recording as simulated.
-    fn says_simulated(&self) -> bool {
-        let says = |folder: &Path| FolderConfig::read(folder).is_ok_and(|config| config.simulated);
+    fn marked_as_simulated(&self) -> bool {
+        let is_marked =
+            |folder: &Path| FolderConfig::read(folder).is_ok_and(|config| config.simulated);
         match self {
             Self::Kitti(drives) => drives.iter().all(Drive::is_simulated),
-            Self::Bags(bags) => bags.iter().all(|bag| bag::says_simulated(bag)),
-            Self::RgbD(folders) => folders.iter().all(|folder| says(folder)),
-            Self::Comma(folder) | Self::Folder(folder) => says(folder),
-            Self::Video(place) if place.is_dir() => says(place),
-            Self::Video(file) => file.parent().is_some_and(says),
-            Self::Several(all) => all.iter().all(|(_, layout)| layout.says_simulated()),
+            Self::Bags(bags) => bags.iter().all(|bag| bag::marked_as_simulated(bag)),
+            Self::RgbD(folders) => folders.iter().all(|folder| is_marked(folder)),
+            Self::Comma(folder) | Self::Folder(folder) => is_marked(folder),
+            Self::Video(place) if place.is_dir() => is_marked(place),
+            Self::Video(file) => file.parent().is_some_and(is_marked),
+            Self::Several(all) => all.iter().all(|(_, layout)| layout.marked_as_simulated()),
             Self::KittiOdometry(_) | Self::Kitti360(_) | Self::NuScenes(_) => false,
         }
     }
@@ -248,7 +249,7 @@ impl Layout {
                 topic: topic.clone(),
             });
         }
-        if options.gives_camera() && self.kind().brings_calibration() {
+        if options.gives_camera() && self.kind().has_own_calibration() {
             return Err(Error::OwnCalibration {
                 path: path.to_owned(),
                 layout: self.kind().label(),
@@ -373,7 +374,7 @@ fn open_several(
         match layout.open_warning(folder, options) {
             Ok(found) => datasets.extend(found),
             Err(Error::SplitSelectsNothing { .. }) => {
-                refused = Selection::new(options).nothing(path);
+                refused = Selection::new(options).nothing_selected(path);
             }
             Err(error) if layout.lacks_images(&error) => {
                 without_images.push(name_of(folder));
