@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn corners_that_fold_over_are_left_out() {
-        // x(1 - x²/4) turns back at 0.77; the image's corners are at 0.84.
+        // x(1 - x²/4) is at most 0.77; the image's corners are at 0.84.
         let bent = Distortion::from_opencv(&[-0.25, 0.0, 0.0, 0.0]).unwrap();
         let k = Lens::new(camera(), &bent).unwrap().intrinsics();
         assert!(k.fx < 60.0 && k.fx > 40.0, "{k:?}");

@@ -17,7 +17,7 @@ pub enum TopicRole {
     Dynamic,
     /// The inertial unit.
     Imu,
-    /// The vehicle's speed, or the satellite positions that it is computed from.
+    /// The vehicle's speed, or the GPS positions from which it is computed.
     Speed,
     /// The steering angle.
     Steering,

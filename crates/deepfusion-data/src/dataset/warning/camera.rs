@@ -126,7 +126,7 @@ mod tests {
             action_camera,
             turned,
         };
-        let from_exif = "the camera is from_exif from EXIF in 000.jpg: 26 mm in 35 mm film, so fx = fy = 3004.6, with a centred principal point; a \
+        let from_exif = "the camera is taken from EXIF in 000.jpg: 26 mm in 35 mm film, so fx = fy = 3004.6, with a centred principal point; a \
                      calibration is better";
         assert_eq!(by_exif(false, false).to_string(), from_exif);
         let message = by_exif(true, true).to_string();

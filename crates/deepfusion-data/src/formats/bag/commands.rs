@@ -1,6 +1,6 @@
 //! Recognises topics with commands to a vehicle instead of measurements: ROS 2's controllers publish both with the same message type.
 
-/// Words in the names of such topics.
+/// Words in the names of topics with commands.
 const WORDS: [&str; 7] = [
     "cmd", "command", "commands", "setpoint", "target", "teleop", "joy",
 ];

@@ -38,7 +38,7 @@ pub(super) struct Scan {
 /// A scan projected into a frame's camera. H×W, row by row.
 #[derive(Debug, Clone)]
 pub(super) struct SeenScan {
-    /// Camera z in metres, 0 = none.
+    /// Camera z in metres, 0 = no depth.
     pub(super) depth: DepthMap,
     /// Index of the scan's point at each pixel; [`SeenScan::NONE`] if there is none.
     point: Vec<u32>,

@@ -21,9 +21,9 @@ use std::sync::Arc;
 impl Dataset {
     /// Opens a recording of any known layout, which is recognised by its files. A KITTI raw drive, date or root gives one data set for
     /// each drive and camera, in order of names; KITTI odometry one for each sequence, KITTI-360 one for each drive, nuScenes one for
-    /// each scene. A bag, a folder of images, a video file, a comma2k19 segment and a folder of RGB-D frames give one. A folder of such recordings whose
-    /// `dataset.toml` has `for_folders = true` gives those of each. Drives without images of the camera, or without a selected frame, are
-    /// left out.
+    /// each scene. A bag, a folder of images, a video file, a comma2k19 segment and a folder of RGB-D frames give one. A folder of such
+    /// recordings whose `dataset.toml` has `for_folders = true` gives those of each. Drives without images of the camera, or without a
+    /// selected frame, are left out.
     ///
     /// The sizes of all images are checked against the calibration. Times and speeds may be missing
     /// (evaluation needs neither), but must be readable if they exist. If something else in the folder looks like a recording, the
@@ -49,8 +49,8 @@ impl Dataset {
         Ok(Layout::of(path)?.kind())
     }
 
-    /// Whether every recording at a path is marked as simulated by the files beside its images ([`Self::is_simulated`]), found without opening
-    /// it; for a bag, only the file beside it counts. `false` if there is no recording.
+    /// Whether every recording at a path is marked as simulated by the files beside its images ([`Self::is_simulated`]), found without
+    /// opening it; for a bag, only the file beside it counts. `false` if there is no recording.
     #[must_use]
     pub fn all_simulated_at(path: &Path) -> bool {
         Layout::of(path).is_ok_and(|layout| layout.marked_as_simulated())

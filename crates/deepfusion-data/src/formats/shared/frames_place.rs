@@ -61,7 +61,7 @@ fn can_be_made(folder: &Path) -> io::Result<()> {
     Err(ErrorKind::NotFound.into())
 }
 
-/// The same, by trying it.
+/// Whether a folder can be created, with its missing parents, by trying it.
 #[cfg(not(unix))]
 fn can_be_made(folder: &Path) -> io::Result<()> {
     deepfusion_fs::PartialFolder::beside(folder).map(drop)
