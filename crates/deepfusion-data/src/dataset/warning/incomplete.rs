@@ -81,9 +81,12 @@ fn of_camera(camera: Option<u8>) -> String {
 
 fn passed_over(folder: &Path, layout: DatasetKind, recordings: &[String]) -> String {
     /// How many names are listed.
-    const MOST: usize = 6;
-    let said = recordings.get(..MOST).unwrap_or(recordings).join(", ");
-    let more = match recordings.len().checked_sub(MOST) {
+    const MAX_LISTED: usize = 6;
+    let listed = recordings
+        .get(..MAX_LISTED)
+        .unwrap_or(recordings)
+        .join(", ");
+    let more = match recordings.len().checked_sub(MAX_LISTED) {
         None | Some(0) => String::new(),
         Some(more) => format!(" and {more} more"),
     };
@@ -93,7 +96,7 @@ fn passed_over(folder: &Path, layout: DatasetKind, recordings: &[String]) -> Str
         ("these", "look like recordings and are", "each")
     };
     format!(
-        "{} is read only as {}; {these} in it {are} not read: {said}{more} (give {each} by its own path)",
+        "{} is read only as {}; {these} in it {are} not read: {listed}{more} (give {each} by its own path)",
         folder.display(),
         layout.label()
     )
@@ -122,8 +125,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_passed_over_is_named_as_far_as_there_is_room() {
-        let said = |count| {
+    fn recordings_that_are_passed_over_are_listed_up_to_a_limit() {
+        let message = |count| {
             let passed_over = IncompleteWarning::PassedOver {
                 folder: "drives".into(),
                 layout: DatasetKind::Folder,
@@ -132,19 +135,19 @@ mod tests {
             passed_over.to_string()
         };
         assert_eq!(
-            said(1),
+            message(1),
             "drives is read only as image folder; this in it looks like a recording and is not read: drive1.bag (give it by its own path)"
         );
         let these = "drives is read only as image folder; these in it look like recordings and are not read: drive1.bag, drive2.bag";
         let each = "(give each by its own path)";
-        assert_eq!(said(2), format!("{these} {each}"));
+        assert_eq!(message(2), format!("{these} {each}"));
         let six = format!("{these}, drive3.bag, drive4.bag, drive5.bag, drive6.bag");
-        assert_eq!(said(6), format!("{six} {each}"));
-        assert_eq!(said(8), format!("{six} and 2 more {each}"));
+        assert_eq!(message(6), format!("{six} {each}"));
+        assert_eq!(message(8), format!("{six} and 2 more {each}"));
     }
 
     #[test]
-    fn what_is_missing_is_counted() {
+    fn messages_count_what_is_missing() {
         let no_images = |camera| IncompleteWarning::NoImages {
             camera,
             recordings: names(2),
@@ -157,7 +160,7 @@ mod tests {
             parts,
             first: "drive.bag: the chunk at byte 7 is too short".into(),
         };
-        for (warning, said) in [
+        for (warning, expected) in [
             (
                 no_images(None),
                 "left out for lack of images: drive1.bag, drive2.bag",
@@ -206,7 +209,7 @@ mod tests {
                 "2 messages or chunks cannot be read; the first: drive.bag: the chunk at byte 7 is too short",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), expected);
         }
     }
 }
