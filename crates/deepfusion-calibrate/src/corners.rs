@@ -122,7 +122,7 @@ mod tests {
     use image::Luma;
 
     #[test]
-    fn lines_have_no_direction() {
+    fn the_angle_between_lines_ignores_their_direction() {
         assert!(between(0.1, PI + 0.1) < 1e-12);
         assert!((between(0.1, PI - 0.1) - 0.2).abs() < 1e-12);
     }
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_know_their_edges_and_on_which_side_it_is_dark() {
+    fn corners_have_edge_directions_and_dark_squares() {
         // Squares of 16 pixels along the axes, with corners at 24 + 16 i; dark where both indices are even.
         let image = GrayImage::from_fn(128, 96, |x, y| {
             let dark = (x + 8) / 16 % 2 == (y + 8) / 16 % 2;

@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sharpest_and_what_is_far_from_it() {
+    fn the_sharpest_and_distant_views_are_picked() {
         let candidates = [at(0.0, 1.0), at(1.0, 5.0), at(300.0, 2.0), at(100.0, 2.0)];
         assert_eq!(pick(&candidates, (400, 300), 3), [1, 2, 3]);
         assert_eq!(pick(&candidates, (400, 300), 2), [1, 2]);
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn blur_is_less_sharp() {
+    fn blur_reduces_sharpness() {
         let edge = |width: f64| {
             GrayImage::from_fn(40, 20, |x, _| {
                 let grey = 127.0 + 100.0 * ((f64::from(x) - 20.0) / width).tanh();

@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_warning_is_said_in_words() {
+    fn warnings_have_their_messages() {
         let few = |used| CalibrationWarning::FewViews { used, enough: 10 };
         for (warning, said) in [
             (few(1), "only 1 view: 10 to 30, from many sides, are better"),

@@ -68,7 +68,7 @@ fn views(camera: &Value) -> Vec<View> {
 /// Every board is found, also at the border of a fisheye image. OpenCV's own corners are up to 0.18 px from the truth here (noise, blur and
 /// JPEG); ours must be as near to both.
 #[test]
-fn corners_are_opencvs() {
+fn corners_match_opencv() {
     for (name, camera) in reference()["cameras"].as_object().unwrap() {
         let (mut worst, mut worst_truth) = (0.0f64, 0.0f64);
         for (view, found) in camera["views"]
@@ -113,7 +113,7 @@ fn k(found: &Calibration) -> [f64; 4] {
 /// For OpenCV's corners the least-squares fit is OpenCV's: same cost, same minimum. The corners are stored to 0.001 px, and OpenCV computed
 /// in single precision; 1e-4 of the focal length is 0.03 px.
 #[test]
-fn the_fit_is_opencvs() {
+fn the_fit_matches_opencv() {
     for (name, camera) in reference()["cameras"].as_object().unwrap() {
         let of = |view: &Value| View {
             name: view["file"].as_str().unwrap().to_owned(),
@@ -161,7 +161,7 @@ fn the_fit_is_opencvs() {
 
 /// From the pictures alone: near to OpenCV, and as near to the truth as the standard errors say (within four of them).
 #[test]
-fn the_camera_is_the_true_one() {
+fn the_camera_matches_the_truth() {
     for (name, camera) in reference()["cameras"].as_object().unwrap() {
         let found = calibrate(&views(camera), &board(), size(camera), model(camera)).unwrap();
         println!(
@@ -299,7 +299,7 @@ fn another_board_is_an_error() {
 
 /// Large pictures are searched at reduced size and refined at full size. A board may also lie on its side.
 #[test]
-fn large_and_turned_pictures() {
+fn boards_are_found_in_large_and_turned_pictures() {
     use image::imageops::{FilterType, resize, rotate90};
     let image = picture("brown/01.jpg");
     let BoardDetection::Board(small) = find_board(&image, &board()) else {
@@ -328,7 +328,7 @@ fn large_and_turned_pictures() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn invalid_input_is_rejected() {
     for (columns, rows, square) in [
         (2, 6, 0.025),
         (9, 101, 0.025),

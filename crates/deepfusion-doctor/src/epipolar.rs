@@ -242,7 +242,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_direction_that_is_off_is_found() {
+    fn a_wrong_direction_of_travel_is_found() {
         let off = Vector2::new(0.05, -0.03);
         let t = turned(&Vector3::z(), off);
         let omega = Vector3::new(0.002, 0.004, -0.001);
@@ -254,7 +254,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn points_go_away_from_where_the_camera_heads() {
+    fn points_move_away_from_the_point_headed_for() {
         let said = Se3::from_axis_angle(Vector3::zeros(), Vector3::z());
         let pair = pair(Vector3::z(), Vector3::new(0.003, 0.02, -0.002), said);
         let turn = pair.turn(&Vector3::z(), YawTrust(f64::INFINITY)).unwrap();

@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn who_notes_that_he_could_not_look_did_not_look() {
+    fn a_skipped_check_with_only_a_note_counts_as_not_made() {
         let mut outcome = Outcome::skipped("speed", MotionSkip::NoRoad);
         let unchecked = MotionReason::Unchecked { fastest_mps: 50.0 };
         outcome.find(Severity::Note, None, unchecked);
@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn nan_never_holds() {
+    fn nan_is_outside_every_limit() {
         for limit in [
             Limit::AtMost(1.0),
             Limit::AtLeast(0.0),

@@ -76,7 +76,7 @@ mod tests {
 
     /// One of each kind with its hint. All messages of a kind are tested beside it.
     #[test]
-    fn a_reason_says_what_its_kind_says() {
+    fn a_reason_has_the_message_and_hint_of_its_kind() {
         let reasons: [FindingReason; 7] = [
             OpeningReason::CourseAlone.into(),
             FramesReason::Backwards { by_s: 0.5 }.into(),

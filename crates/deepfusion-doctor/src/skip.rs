@@ -63,7 +63,7 @@ mod tests {
 
     /// One of each kind. All messages of a kind are tested beside it.
     #[test]
-    fn a_reason_says_what_its_kind_says() {
+    fn a_reason_has_the_message_of_its_kind() {
         let error = Error::file(Path::new("drive"), ErrorKind::NotFound.into());
         let message = error.to_string();
         let reasons: [SkipReason; 8] = [

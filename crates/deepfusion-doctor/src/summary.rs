@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn a_check_is_one_over_all_drives_and_so_is_a_reason() {
+    fn checks_and_reasons_are_merged_over_all_drives() {
         let turns = |spread_radps| MotionSkip::HardlyTurns {
             spread_radps,
             needed_radps: 0.015,

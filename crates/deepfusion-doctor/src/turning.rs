@@ -63,7 +63,7 @@ mod tests {
     use super::longest;
 
     #[test]
-    fn the_stretch_with_the_longest_way_is_read() {
+    fn the_stretch_with_the_longest_distance_is_read() {
         assert_eq!(longest(&[], 4), 0..1);
         assert_eq!(longest(&[1.0; 3], 4), 0..4);
         assert_eq!(longest(&[0.0, 0.0, 0.0, 0.0, 1.0, 1.0], 4), 3..7);

@@ -30,7 +30,7 @@ fn picture() -> RgbImage {
 }
 
 #[test]
-fn red_things_are_found_with_their_pixels() {
+fn red_rectangles_are_found_with_their_pixels() {
     if !library_is_there() {
         return;
     }
@@ -78,7 +78,7 @@ fn red_things_are_found_with_their_pixels() {
 }
 
 #[test]
-fn other_models_and_other_files_are_named() {
+fn unusable_models_and_files_are_named() {
     let load = |path: PathBuf| InstanceModel::load(&path, None, 1, Limits::default()).unwrap_err();
     let missing = load(fixture("missing"));
     assert!(matches!(missing, Error::File { .. }) && missing.to_string().contains("missing.onnx"));

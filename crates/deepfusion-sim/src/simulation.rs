@@ -441,7 +441,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scans_between_frames_are_looked_at() {
+    fn the_times_of_scans_between_frames_are_included() {
         let found = looked_at(&[0.0, 0.25]);
         assert_eq!(found, [0.0, 0.25, 0.0, 0.1, 0.2]);
         let found = looked_at(&[0.0, 0.3]);
@@ -450,7 +450,7 @@ mod tests {
 
     /// A car ahead of the camera at one scan is also there at the next one, although frames are half a second apart.
     #[test]
-    fn no_car_vanishes_from_scan_to_scan() {
+    fn no_car_disappears_from_scan_to_scan() {
         let simulation = Simulation::new(&SimConfig {
             seed: 2,
             frames: 8,

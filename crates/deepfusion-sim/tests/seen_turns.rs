@@ -113,7 +113,7 @@ fn images_show_how_the_vehicle_turned() {
 
 /// If the images show nothing, the drive does not change.
 #[test]
-fn turns_that_nothing_shows_are_not_made_up() {
+fn images_without_detail_give_no_turns() {
     let at = tempfile::tempdir().unwrap();
     let truth = drive(&at.path().join("kitti"), Scene::Urban);
     let folder = at.path().join("folder");
@@ -179,7 +179,7 @@ fn a_wrong_unit_is_found_without_a_yaw_rate() {
 
 /// A part of a drive has the images and the motion of its own frames only.
 #[test]
-fn a_part_of_a_drive_is_one() {
+fn a_part_of_a_drive_has_the_data_of_its_frames() {
     let at = tempfile::tempdir().unwrap();
     let whole = drive(at.path(), Scene::Urban);
     let part = whole.with_frames(10..20);

@@ -262,7 +262,7 @@ fn a_bag_has_the_drawn_camera_and_its_mount() {
 
 /// No car appears or disappears within sight, although varied streets are too narrow for some.
 #[test]
-fn no_car_vanishes_before_the_camera() {
+fn no_car_disappears_ahead_of_the_camera() {
     let mut met = 0;
     for seed in 1..4 {
         let simulation = drive(&SimConfig {
@@ -301,7 +301,7 @@ fn no_car_vanishes_before_the_camera() {
 }
 
 #[test]
-fn what_a_varied_drive_cannot_have_is_refused() {
+fn settings_that_a_varied_drive_cannot_have_are_refused() {
     let varied = || config(Scene::Urban, 1);
     let bad = [
         (

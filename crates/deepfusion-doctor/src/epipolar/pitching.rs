@@ -53,7 +53,7 @@ mod tests {
     use deepfusion_geometry::Se3;
 
     #[test]
-    fn the_turn_is_the_camera_s_whether_its_nose_is_up_or_down() {
+    fn the_turn_is_right_at_any_pitch() {
         let omega = Vector3::new(0.003, 0.02, -0.002);
         let said = Se3::from_axis_angle(Vector3::zeros(), Vector3::z());
         for pitch in [-0.02, 0.0, 0.02] {

@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_file_and_its_key_are_named() {
+    fn hints_name_the_file_and_its_key() {
         let cases: [(DataWarning, &str); 7] = [
             (
                 CameraWarning::Assumed {

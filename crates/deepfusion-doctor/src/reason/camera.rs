@@ -243,7 +243,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_wrong_with_its_numbers_is_said() {
+    fn intrinsics_problems_have_their_messages() {
         for (reason, said) in [
             (
                 CameraReason::View {
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn where_it_heads_is_said_in_words() {
+    fn messages_name_the_direction_of_travel() {
         for (angle, off_deg, side) in [
             (HeadingAngle::Pitch, 2.04, "up"),
             (HeadingAngle::Pitch, -2.04, "down"),
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn by_how_much_to_correct_is_said() {
+    fn hints_name_the_correction() {
         let heading = |angle, centre_by_px| CameraReason::Heading {
             angle,
             off_deg: 2.04,
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn what_measured_depth_says_of_the_mounts() {
+    fn mount_problems_have_their_messages() {
         let turned = |angle| CameraReason::RoadTurned {
             frames: 8,
             camera_by_deg: 3.04,

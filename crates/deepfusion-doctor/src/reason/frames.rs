@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_wrong_with_times_is_said() {
+    fn timing_problems_have_their_messages() {
         let lost = |lost| FramesReason::Lost {
             lost,
             rate_hz: 10.04,

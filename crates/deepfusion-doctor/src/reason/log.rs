@@ -158,7 +158,7 @@ mod tests {
     use deepfusion_logs::TableNote;
 
     #[test]
-    fn what_a_log_holds_is_said_with_its_notes() {
+    fn the_contents_of_a_log_are_printed_with_its_notes() {
         let notes: Vec<LogNote> = vec![
             TableNote::HeaderAgain { more: 1 }.into(),
             TableNote::HeaderAgain { more: 2 }.into(),
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_log_is_said() {
+    fn log_problems_have_their_messages() {
         for (reason, said) in [
             (
                 LogReason::NoSpeed(NoGps::NoFix),

@@ -196,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_contradicts_the_speeds_is_said() {
+    fn speed_problems_have_their_messages() {
         let road = SpeedWarning {
             implied_height_m: 6.0,
             pairs: 12,
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn directions_are_said_in_words() {
+    fn messages_name_the_direction() {
         for (reason, said) in [
             (
                 MotionReason::LidarSideways { left_deg: 3.96 },
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_turns_and_clock_is_said() {
+    fn turn_and_clock_problems_have_their_messages() {
         let offset = |vehicle_minus_camera_s| MotionReason::ClockOffset {
             vehicle_minus_camera_s,
             std_error_s: 0.0041,
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn what_to_multiply_by_is_said() {
+    fn hints_name_the_factor_or_offset() {
         let road = |implied_height_m| {
             let pairs = 12;
             MotionReason::Road(SpeedWarning {

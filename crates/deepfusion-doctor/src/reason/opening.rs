@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_taken_for_granted_is_said() {
+    fn assumptions_have_their_messages() {
         assert_eq!(
             OpeningReason::NoTurns.to_string(),
             "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked; training takes the turns from the images"

@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn how_pictures_look_is_said() {
+    fn picture_problems_have_their_messages() {
         let jumps = |jumps, first_ratio| PicturesReason::BrightnessJumps {
             jumps,
             neighbours: 99,
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn what_to_cut_off_is_said() {
+    fn hints_name_the_rows_and_columns_to_keep() {
         let rim = |side, across| PicturesReason::StillRim {
             side,
             pixels: 12,

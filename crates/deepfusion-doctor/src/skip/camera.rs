@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn why_the_camera_is_not_judged_is_said() {
+    fn skip_reasons_have_their_messages() {
         let unsure = |angle| UnsureHeading {
             angle,
             off_deg: -0.44,

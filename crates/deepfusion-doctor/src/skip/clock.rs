@@ -32,7 +32,7 @@ mod tests {
 
     /// The messages leave out the drive's name, which is printed beside them.
     #[test]
-    fn why_the_clocks_are_not_compared_is_said() {
+    fn skip_reasons_have_their_messages() {
         let drive = "monday".to_owned();
         for (reason, said) in [
             (

@@ -23,7 +23,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_frames_lack_is_said() {
+    fn skip_reasons_have_their_messages() {
         for (reason, said) in [
             (
                 FramesSkip::NoneInMotion,

@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_motion_lacks_is_said() {
+    fn skip_reasons_have_their_messages() {
         for (reason, said) in [
             (
                 MotionSkip::NoRoad,

@@ -26,7 +26,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_pictures_lack_is_said() {
+    fn skip_reasons_have_their_messages() {
         for (reason, said) in [
             (PicturesSkip::NoImage, "no image can be read"),
             (

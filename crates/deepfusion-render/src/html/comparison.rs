@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_cannot_be_right_carry_a_sign() {
+    fn implausible_rows_are_marked() {
         let tables = published_tables().unwrap();
         let html = HtmlReport::new("t", "s").comparison(&tables).to_html();
         check_page(&html);

@@ -68,7 +68,7 @@ mod tests {
     use super::ExpectedSetting as Expected;
 
     #[test]
-    fn a_setting_is_said_in_words_with_its_unit() {
+    fn expected_values_are_printed_with_their_unit() {
         let (from, to) = (-0.5, 100_000.0);
         for (expected, said) in [
             (Expected::Within { from, to }, "-0.5 to 100000"),

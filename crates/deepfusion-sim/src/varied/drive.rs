@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_drawn_is_said() {
+    fn drawn_values_are_in_the_json() {
         let look = look(Scene::Urban, 2);
         let text = look.drawn().to_json();
         let said: serde_json::Value = serde_json::from_str(&text).unwrap();

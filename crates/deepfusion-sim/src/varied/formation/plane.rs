@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_filter_spreads_a_point_by_its_bell_and_keeps_its_light() {
+    fn a_filter_spreads_a_point_and_keeps_its_sum() {
         let (width, height) = (31, 21);
         let mut plane = vec![0.0; width * height];
         plane[10 * width + 15] = 1.0;
