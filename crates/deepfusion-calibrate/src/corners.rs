@@ -72,7 +72,11 @@ pub(crate) fn between(a: f64, b: f64) -> f64 {
 /// Refines a corner: the point q for which all image gradients g around it are perpendicular to the lines towards it, in a window of `half`
 /// pixels to each side. It solves Σ w g gᵀ (p − q) = 0 over the pixels p (Förstner and Gülch, 1987; as OpenCV's `cornerSubPix`). `None` if
 /// q moves out of the window.
-pub(crate) fn place(image: &GrayImage, start: Vector2<f64>, half: i32) -> Option<Vector2<f64>> {
+pub(crate) fn refine_corner(
+    image: &GrayImage,
+    start: Vector2<f64>,
+    half: i32,
+) -> Option<Vector2<f64>> {
     let mut at = start;
     let reach = f64::from(half);
     for _ in 0..MAX_STEPS {
@@ -129,7 +133,7 @@ mod tests {
 
     /// Four squares with a soft edge, whose corner is between pixels.
     #[test]
-    fn a_corner_is_placed_between_pixels() {
+    fn a_corner_is_refined_between_pixels() {
         let (cx, cy) = (20.3, 17.8);
         let image = GrayImage::from_fn(40, 36, |x, y| {
             let soft = |d: f64| (d / 1.5).tanh();
@@ -137,12 +141,12 @@ mod tests {
             Luma([(125.0 + 80.0 * soft(u) * soft(v)).round() as u8])
         });
         let start = Vector2::new(21.0, 17.0);
-        let at = place(&image, start, 5).unwrap();
+        let at = refine_corner(&image, start, 5).unwrap();
         assert!((at - Vector2::new(cx, cy)).norm() < 0.02, "{at}");
         // A plain image has no corner, and a refinement finds none.
         let plain = GrayImage::from_pixel(40, 36, Luma([90]));
         assert!(find(&plain, false).is_empty());
-        assert_eq!(place(&plain, start, 5), None);
+        assert_eq!(refine_corner(&plain, start, 5), None);
     }
 
     #[test]

@@ -13,7 +13,7 @@ const PINHOLE_WIDTHS: [f64; 5] = [0.42, 0.7, 1.0, 1.6, 2.8];
 const FISHEYE_VIEWS: [f64; 6] = [1.2, 1.75, 2.3, 2.8, 3.3, 4.0];
 
 /// Starting points, the best first: cameras with the principal point in the middle of the image, and poses.
-pub(crate) fn beginnings(
+pub(crate) fn starting_points(
     views: &[&[Vector2<f64>]],
     board: &[Vector3<f64>],
     size: (u32, u32),

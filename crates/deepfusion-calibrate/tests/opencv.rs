@@ -36,7 +36,7 @@ fn board() -> Board {
 }
 
 /// Greatest and root mean square distance of corners in the same or the opposite order, in pixels.
-fn apart(found: &[Vector2<f64>], expected: &[Vector2<f64>]) -> (f64, f64) {
+fn corner_distances(found: &[Vector2<f64>], expected: &[Vector2<f64>]) -> (f64, f64) {
     assert_eq!(found.len(), expected.len());
     let of = |found: Vec<&Vector2<f64>>| {
         let d: Vec<f64> = found
@@ -77,9 +77,10 @@ fn corners_match_opencv() {
             .iter()
             .zip(views(camera))
         {
-            let (most, mean) = apart(&found.corners, &points(&view["corners"]));
-            let (most_truth, mean_truth) = apart(&found.corners, &points(&view["truth"]));
-            let (_, opencvs) = apart(&points(&view["corners"]), &points(&view["truth"]));
+            let (most, mean) = corner_distances(&found.corners, &points(&view["corners"]));
+            let (most_truth, mean_truth) =
+                corner_distances(&found.corners, &points(&view["truth"]));
+            let (_, opencvs) = corner_distances(&points(&view["corners"]), &points(&view["truth"]));
             assert!(most < 0.2 && mean < 0.08, "{}: {most} {mean}", found.name);
             assert!(most_truth < 0.2, "{}: {most_truth}", found.name);
             assert!(
@@ -271,13 +272,13 @@ fn another_board_is_an_error() {
     // A part of the board is not accepted as the board.
     for (columns, rows) in [(8, 6), (9, 7), (7, 5)] {
         let asked = Board::new(columns, rows, 0.025).unwrap();
-        let look = find_board(&image, &asked);
+        let detection = find_board(&image, &asked);
         let expected = BoardDetection::Other {
             columns: 9,
             rows: 6,
             corners: 54,
         };
-        assert_eq!(look, expected, "{columns}x{rows}");
+        assert_eq!(detection, expected, "{columns}x{rows}");
     }
     // Rows and columns may be swapped.
     let BoardDetection::Board(turned) = find_board(&image, &Board::new(6, 9, 0.025).unwrap())
@@ -313,7 +314,7 @@ fn boards_are_found_in_large_and_turned_pictures() {
         .iter()
         .map(|p| p.map(|n| (n + 0.5) / 5.0 - 0.5))
         .collect();
-    let (most, _) = apart(&back, &small);
+    let (most, _) = corner_distances(&back, &small);
     assert!(most < 0.2, "{most}");
     let BoardDetection::Board(turned) = find_board(&rotate90(&image), &board()) else {
         panic!("not found");
@@ -323,7 +324,7 @@ fn boards_are_found_in_large_and_turned_pictures() {
         .iter()
         .map(|p| Vector2::new(p.y, last - p.x))
         .collect();
-    let (most, _) = apart(&back, &small);
+    let (most, _) = corner_distances(&back, &small);
     assert!(most < 0.02, "{most}");
 }
 

@@ -147,12 +147,12 @@ impl Diagnosis {
     /// All findings with the drive they are about, the worst first.
     #[must_use]
     pub fn findings(&self) -> Vec<(Option<&str>, &Finding)> {
-        let whole = self.recording.iter().map(|outcome| (None, outcome));
+        let of_recording = self.recording.iter().map(|outcome| (None, outcome));
         let drives = self.drives.iter().flat_map(|drive| {
             let named = |outcome| (Some(drive.name.as_str()), outcome);
             drive.outcomes.iter().map(named)
         });
-        let mut found: Vec<(Option<&str>, &Finding)> = whole
+        let mut found: Vec<(Option<&str>, &Finding)> = of_recording
             .chain(drives)
             .flat_map(|(name, outcome)| outcome.findings.iter().map(move |f| (name, f)))
             .collect();

@@ -27,8 +27,11 @@ impl<'a> CheckSummary<'a> {
             let Some(why) = &outcome.skipped else {
                 continue;
             };
-            let said = why.to_string();
-            match reasons.iter_mut().find(|(one, _)| one.to_string() == said) {
+            let message = why.to_string();
+            match reasons
+                .iter_mut()
+                .find(|(one, _)| one.to_string() == message)
+            {
                 Some((_, drives)) => drives.push(drive),
                 None => reasons.push((why, vec![drive])),
             }

@@ -29,8 +29,8 @@ fn found<'a>(diagnosis: &'a Diagnosis, check: &str, quantity: &str) -> &'a Findi
     };
     let all = complaints(diagnosis);
     all.iter().copied().find(fits).unwrap_or_else(|| {
-        let said = outcome(diagnosis, check);
-        panic!("no {check} ({quantity}) in {all:#?}, but {said:#?}")
+        let other = outcome(diagnosis, check);
+        panic!("no {check} ({quantity}) in {all:#?}, but {other:#?}")
     })
 }
 
@@ -401,11 +401,11 @@ fn cameras_that_are_swapped_are_reported() {
     let drive = Drive::clean();
     drive.second_camera(-6);
     let right = drive.diagnose();
-    let said = &right.recording[0];
-    assert_eq!(said.check, "stereo");
+    let stereo = &right.recording[0];
+    assert_eq!(stereo.check, "stereo");
     assert!(
-        said.skipped.is_none() && said.findings.is_empty(),
-        "{said:?}"
+        stereo.skipped.is_none() && stereo.findings.is_empty(),
+        "{stereo:?}"
     );
 
     let drive = Drive::clean();
@@ -574,9 +574,9 @@ fn a_log_that_ends_early_is_distinguished_from_one_with_gaps() {
     drive.remove_oxts(images - 8..images);
     let diagnosis = drive.diagnose();
     let finding = found(&diagnosis, "timing", "time without a motion");
-    let said = finding.what.to_string();
-    assert!(said.contains("before the last image"), "{said}");
-    assert!(!said.contains("after the first"), "{said}");
+    let message = finding.what.to_string();
+    assert!(message.contains("before the last image"), "{message}");
+    assert!(!message.contains("after the first"), "{message}");
     assert!(finding.hint.contains("start_s"), "{finding:?}");
 }
 

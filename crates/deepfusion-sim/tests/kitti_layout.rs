@@ -232,9 +232,9 @@ fn errors_name_the_final_path() {
         ControlFlow::Continue(())
     })
     .expect_err("its folders are gone");
-    let said = error.to_string();
-    assert!(said.contains("2026_01_01_drive_0012_sync"), "{said}");
-    assert!(!said.contains("partial"), "{said}");
+    let message = error.to_string();
+    assert!(message.contains("2026_01_01_drive_0012_sync"), "{message}");
+    assert!(!message.contains("partial"), "{message}");
 }
 
 #[test]

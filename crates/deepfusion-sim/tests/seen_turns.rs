@@ -92,11 +92,12 @@ fn images_show_how_the_vehicle_turned() {
         // With these turns, the camera's motion between images is the true one.
         alone.take_turns(&without_yaw);
         assert!(alone.yaw_known() && !alone.tilt_unknown());
-        let said: Vec<String> = alone.warnings().iter().map(ToString::to_string).collect();
-        let said = said.join("\n");
+        let messages: Vec<String> = alone.warnings().iter().map(ToString::to_string).collect();
+        let messages = messages.join("\n");
         assert!(
-            said.contains("estimating them from the images") && !said.contains("no yaw rate"),
-            "{said}"
+            messages.contains("estimating them from the images")
+                && !messages.contains("no yaw rate"),
+            "{messages}"
         );
         let turned_off: Vec<f64> = (1..60)
             .map(|i| {

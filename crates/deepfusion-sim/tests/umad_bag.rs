@@ -139,8 +139,11 @@ fn a_bag_does_not_replace_another_file() {
         std::fs::write(&taken, "another's").unwrap();
         ControlFlow::Continue(())
     });
-    let said = error.unwrap_err().to_string();
-    assert!(said.contains("commercial_0011.bag: cannot move"), "{said}");
+    let message = error.unwrap_err().to_string();
+    assert!(
+        message.contains("commercial_0011.bag: cannot move"),
+        "{message}"
+    );
     assert_eq!(std::fs::read(&taken).unwrap(), b"another's");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }

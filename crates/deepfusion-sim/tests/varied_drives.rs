@@ -132,9 +132,9 @@ fn the_road_lies_where_the_written_camera_sees_it() {
             ControlFlow::Continue(())
         })
         .expect("written");
-        let said = fs::read(path.join("varied.json")).expect("what was drawn");
-        let said: serde_json::Value = serde_json::from_slice(&said).expect("JSON");
-        let of = |key: &str| said["camera"][key].as_f64().expect("a number");
+        let bytes = fs::read(path.join("varied.json")).expect("what was drawn");
+        let json: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
+        let of = |key: &str| json["camera"][key].as_f64().expect("a number");
         let k = open(folder.path()).intrinsics(0);
         let drawn = simulation.drawn().expect("varied").camera.intrinsics;
         for (a, b) in [
@@ -231,8 +231,8 @@ fn a_bag_has_the_drawn_camera_and_its_mount() {
         &mut |_, _| ControlFlow::Continue(()),
     )
     .expect("written");
-    let said = fs::read_to_string(path.with_extension("varied.json")).expect("what was drawn");
-    assert!(said.contains("\"weather\"") && said.contains("\"jpeg_quality\""));
+    let text = fs::read_to_string(path.with_extension("varied.json")).expect("what was drawn");
+    assert!(text.contains("\"weather\"") && text.contains("\"jpeg_quality\""));
     let set = open(&path);
     let (k, drawn) = (set.intrinsics(0), simulation.intrinsics());
     assert_eq!(

@@ -170,8 +170,8 @@ mod tests {
             (DataWarning::Other("it rained".into()), "dataset.toml"),
         ];
         for (warning, named) in cases {
-            let said = hint(&warning);
-            assert!(said.contains(named), "{warning}: {said}");
+            let hint = hint(&warning);
+            assert!(hint.contains(named), "{warning}: {hint}");
         }
     }
 }

@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn intrinsics_problems_have_their_messages() {
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 CameraReason::View {
                     fx: 7.2,
@@ -279,7 +279,7 @@ mod tests {
                 "cy 117.6 is far from the middle of 480 pixels: only a cropped image has it there",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 
@@ -356,10 +356,10 @@ mod tests {
             angle,
         };
         for (angle, name) in [(RoadAngle::Pitch, "pitch"), (RoadAngle::Roll, "roll")] {
-            let said = format!(
+            let message = format!(
                 "the road in the measured depth of 8 frames is turned by 3.0 degrees ({name}) against what the mounts say"
             );
-            assert_eq!(turned(angle).to_string(), said);
+            assert_eq!(turned(angle).to_string(), message);
         }
         assert_eq!(
             CameraReason::Height { height_m: 0.33 }.to_string(),

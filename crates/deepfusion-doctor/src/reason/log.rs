@@ -163,7 +163,7 @@ mod tests {
             TableNote::HeaderAgain { more: 1 }.into(),
             TableNote::HeaderAgain { more: 2 }.into(),
         ];
-        let said = [notes[0].to_string(), notes[1].to_string()].join("; ");
+        let message = [notes[0].to_string(), notes[1].to_string()].join("; ");
         let holds = LogReason::Holds {
             log: "drive.csv".into(),
             format: Format::Table,
@@ -173,7 +173,7 @@ mod tests {
         };
         assert_eq!(
             holds.to_string(),
-            format!("table with 13 speeds and 1 yaw rate: {said}")
+            format!("table with 13 speeds and 1 yaw rate: {message}")
         );
         assert_eq!(
             holds.hint(),
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn log_problems_have_their_messages() {
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 LogReason::NoSpeed(NoGps::NoFix),
                 "the camera's own log has no speed: the camera's GPS never had a fix",
@@ -227,7 +227,7 @@ mod tests {
                 "the times are not dates: when the video began is unknown, unless the log began with it",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

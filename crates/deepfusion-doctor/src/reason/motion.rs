@@ -202,7 +202,7 @@ mod tests {
             pairs: 12,
         };
         assert_eq!(MotionReason::Road(road).to_string(), road.to_string());
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 MotionReason::Unchecked { fastest_mps: 50.04 },
                 "neither road nor poses show whether the speeds are right: according to them, the vehicle drives at up to 50.0 m/s (180 km/h)",
@@ -238,13 +238,13 @@ mod tests {
                 "of 400 points that are dynamic according to their radial velocity, the topic of dynamic points contains 12",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 
     #[test]
     fn messages_name_the_direction() {
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 MotionReason::LidarSideways { left_deg: 3.96 },
                 "according to its radial velocities, the LiDAR moves 4.0 degrees to the left of the direction that its mount gives",
@@ -262,7 +262,7 @@ mod tests {
                 "according to its radial velocities, the LiDAR moves 4.0 degrees below the direction that its mount gives",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 
@@ -273,7 +273,7 @@ mod tests {
             std_error_s: 0.0041,
             camera_ahead_s: -vehicle_minus_camera_s,
         };
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 MotionReason::Steering {
                     turning_s: 12.3,
@@ -299,7 +299,7 @@ mod tests {
                  another unit), and depths would be wrong by as much",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 

@@ -158,7 +158,7 @@ mod tests {
             share: 0.993,
             across: 96,
         };
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 PicturesReason::LittleParallax,
                 "the picture hardly moves from frame to frame: the parallax is below the images' noise",
@@ -198,7 +198,7 @@ mod tests {
                 "14 pixels at the left do not change while the vehicle moves (over 99 % of that side): training on them teaches that this part of the vehicle is infinitely far",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 

@@ -104,7 +104,7 @@ mod tests {
             off_deg: -0.44,
             std_error_deg: 0.71,
         };
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 CameraSkip::Heading(NoHeading {
                     straight: 1,
@@ -139,7 +139,7 @@ mod tests {
                 "too few points are seen by both cameras",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

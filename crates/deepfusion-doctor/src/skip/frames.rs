@@ -24,7 +24,7 @@ mod tests {
 
     #[test]
     fn skip_reasons_have_their_messages() {
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 FramesSkip::NoneInMotion,
                 "no neighbouring frames while the vehicle moves",
@@ -35,7 +35,7 @@ mod tests {
                 "no pair of neighbouring frames has a known motion",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn skip_reasons_have_their_messages() {
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 MotionSkip::NoRoad,
                 "no visible road (too dark, too plain, or unknown turns), and no poses",
@@ -124,7 +124,7 @@ mod tests {
                 "the vehicle hardly turns (yaw rate ±0.004 rad/s, 0.015 are needed)",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

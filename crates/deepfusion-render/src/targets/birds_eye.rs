@@ -66,8 +66,8 @@ pub fn birds_eye(
         }
         let centre = on_ground(target.center_m);
         if let (Some(true), Some(v)) = (target.moving, target.velocity_mps) {
-            let there: [f64; 3] = std::array::from_fn(|i| target.center_m[i] + ARROW_S * v[i]);
-            line(&mut picture, centre, on_ground(there), 2, colour);
+            let later: [f64; 3] = std::array::from_fn(|i| target.center_m[i] + ARROW_S * v[i]);
+            line(&mut picture, centre, on_ground(later), 2, colour);
         }
         let at = (centre[0] as i32 + 4, centre[1] as i32 - 5);
         draw_text(

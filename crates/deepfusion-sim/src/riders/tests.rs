@@ -16,8 +16,8 @@ fn street(seed: u64) -> (World, Riders) {
     let mut world = World::furnish(road, seed, Scene::Urban);
     let models = world.people();
     let traffic = Traffic::new(&mut rng, &world, &drive, DURATION_S, 3);
-    let way = (&drive, DURATION_S);
-    let riders = Riders::along(&mut rng, &world, &models, way, &traffic, 12);
+    let driven = (&drive, DURATION_S);
+    let riders = Riders::along(&mut rng, &world, &models, driven, &traffic, 12);
     (world, riders)
 }
 

@@ -54,8 +54,8 @@ mod tests {
         for view in &turns {
             seen.entry(view.world).or_default().push(view.view);
         }
-        let whole = seen.values().filter(|views| views.len() == 24).count();
-        assert!(whole >= 16 * 4);
+        let complete = seen.values().filter(|views| views.len() == 24).count();
+        assert!(complete >= 16 * 4);
         for views in seen.values() {
             let distinct: HashSet<&u64> = views.iter().collect();
             assert_eq!(distinct.len(), views.len());

@@ -121,8 +121,8 @@ mod tests {
         filter(&mut plane, &mut vec![0.0; width * height], width, &taps);
         assert!((plane.iter().sum::<f32>() - 1.0).abs() < 1e-5);
         for (dx, dy) in [(0usize, 0usize), (1, 0), (2, 3), (0, 3)] {
-            let there = plane[(10 + dy) * width + 15 - dx];
-            assert!((there - taps[dx] * taps[dy]).abs() < 1e-6);
+            let value = plane[(10 + dy) * width + 15 - dx];
+            assert!((value - taps[dx] * taps[dy]).abs() < 1e-6);
         }
     }
 
