@@ -1,4 +1,4 @@
-//! Corners of the board that the detector missed, searched where their neighbours predict them.
+//! Corners of the board that the detector missed, searched for where their neighbours predict them.
 
 use crate::corners::{Corner, grey, refine_corner};
 use crate::grid::{Grid, extent};

@@ -35,7 +35,7 @@ pub(crate) struct EpipolarPair {
     /// Motion that the vehicle measured.
     pub(crate) earlier_from_later: Se3,
     pub(crate) dt_s: f64,
-    /// The time half way, in seconds on the frames' clock.
+    /// The time halfway between the two images, in seconds on the frames' clock.
     pub(crate) middle_s: f64,
     pub(crate) speed_mps: f64,
 }
@@ -107,7 +107,7 @@ impl EpipolarPair {
         })
     }
 
-    /// The turn that the points show if the camera moved along `direction`; `None` where they do not
+    /// The turn that the points show if the camera moved along `direction`; `None` if they do not
     /// determine one.
     pub(crate) fn turn(&self, direction: &Vector3<f64>, yaw: YawTrust) -> Option<Turn> {
         let measured = self.earlier_from_later.axis_angle();

@@ -5,7 +5,7 @@ use super::skip::SkipReason;
 use serde::{Serialize, Serializer};
 use std::fmt;
 
-/// How bad a finding is.
+/// The severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -46,7 +46,7 @@ pub struct Figure {
 /// Something that is wrong with a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// How bad it is.
+    /// Severity of the finding.
     pub severity: Severity,
     /// The check that found it, such as `clock`.
     pub check: &'static str,

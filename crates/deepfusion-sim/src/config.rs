@@ -13,7 +13,7 @@ pub enum Scene {
     Urban,
     /// An enclosed park: a narrow road between lawns and trees, few cars, slowly driven.
     Park,
-    /// A car park under ground: dark, near walls, pillars, a low ceiling, at walking speed.
+    /// An underground car park: dark, near walls, pillars, a low ceiling, at walking speed.
     Garage,
     /// A shopping street: large houses on both sides, wide pavements, many parked cars.
     Commercial,

@@ -520,7 +520,7 @@ fn files_beside_the_drives_are_noted() {
 }
 
 #[test]
-fn an_unreadable_recording_is_a_finding() {
+fn a_recording_that_cannot_be_opened_is_a_finding() {
     let folder = tempfile::tempdir().unwrap();
     let diagnosis = doctor(folder.path(), None);
     assert_eq!(diagnosis.worst(), Some(Severity::Error));

@@ -112,9 +112,9 @@ fn images_show_how_the_vehicle_turned() {
     }
 }
 
-/// If the images show nothing, the drive does not change.
+/// If a third of the images show nothing, too few turns are found, and the drive does not change.
 #[test]
-fn images_without_detail_give_no_turns() {
+fn too_few_turns_leave_the_drive_unchanged() {
     let at = tempfile::tempdir().unwrap();
     let truth = drive(&at.path().join("kitti"), Scene::Urban);
     let folder = at.path().join("folder");

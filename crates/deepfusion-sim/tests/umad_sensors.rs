@@ -1,4 +1,4 @@
-//! The FMCW LiDAR, the 6-axis unit and the CAN bus against the exact motion.
+//! The FMCW LiDAR, the 6-axis unit and the CAN bus compared with the exact motion.
 
 use deepfusion_sim::{SceneObject, Sensors, SimConfig, Simulation, WHEELBASE_M};
 use nalgebra::Vector3;

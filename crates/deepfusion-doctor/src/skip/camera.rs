@@ -12,10 +12,10 @@ pub enum CameraSkip {
     #[error(transparent)]
     Heading(#[from] NoHeading),
     /// No angle is known well enough.
-    #[error("not sure enough: {}", together(.0))]
+    #[error("too uncertain: {}", together(.0))]
     Unsure(Vec<UnsureHeading>),
     /// The camera's mount is unknown.
-    #[error("nothing says where the camera is on the vehicle")]
+    #[error("the camera's mount on the vehicle is unknown")]
     NoMount,
     /// Too little of the road was measured.
     #[error(
@@ -114,11 +114,11 @@ mod tests {
             ),
             (
                 CameraSkip::Unsure([HeadingAngle::Pitch, HeadingAngle::Yaw].map(unsure).into()),
-                "not sure enough: pitch of the direction of travel -0.4 ± 0.7 degrees, yaw of the direction of travel -0.4 ± 0.7 degrees",
+                "too uncertain: pitch of the direction of travel -0.4 ± 0.7 degrees, yaw of the direction of travel -0.4 ± 0.7 degrees",
             ),
             (
                 CameraSkip::NoMount,
-                "nothing says where the camera is on the vehicle",
+                "the camera's mount on the vehicle is unknown",
             ),
             (
                 CameraSkip::LittleRoad {

@@ -5,7 +5,8 @@ use deepfusion_eval::compare::{Rank, Table, Tables};
 use super::{Cell, HtmlReport, Mark};
 
 impl HtmlReport {
-    /// Adds tables of evaluations, a section each. The best and second best of each column are marked, implausible rows have their reasons.
+    /// Adds tables of evaluations, a section each. The best and second best of each column are marked; implausible rows carry a sign and
+    /// footnotes with the reasons.
     #[must_use]
     pub fn comparison(mut self, tables: &Tables) -> Self {
         for note in &tables.notes {

@@ -6,11 +6,11 @@ use super::line::line;
 use crate::captioned::{INK, PAPER};
 use crate::text::{TextSize, draw_text};
 
-/// Colour of free ground, and of occupied ground.
+/// Colour of free ground.
 const FREE: Rgb<u8> = Rgb([226, 240, 226]);
-/// See [`FREE`].
+/// Colour of occupied ground.
 const OCCUPIED: Rgb<u8> = Rgb([120, 120, 128]);
-/// Distance between lines: ten metres.
+/// Colour of the lines, one every ten metres.
 const GRID: Rgb<u8> = Rgb([200, 204, 212]);
 /// Seconds of motion that an arrow shows.
 const ARROW_S: f64 = 1.0;
