@@ -305,7 +305,7 @@ pub struct CommonCameraAhead {
 /// [`camera_ahead`] of drives recorded with one setup. Of two cameras on one clock, only the first is used.
 ///
 /// # Errors
-/// As [`camera_ahead`], if no drive shows it; [`NoCameraAhead::Differ`] and [`NoCameraAhead::SaysOther`] if a drive contradicts the
+/// As [`camera_ahead`], if no drive shows it; [`NoCameraAhead::Differ`] and [`NoCameraAhead::GivesOther`] if a drive contradicts the
 /// others.
 pub fn common_camera_ahead<'a>(
     datasets: impl IntoIterator<Item = &'a Dataset>,
