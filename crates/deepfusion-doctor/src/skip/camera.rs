@@ -12,10 +12,10 @@ pub enum CameraSkip {
     #[error(transparent)]
     Heading(#[from] NoHeading),
     /// No angle is known well enough.
-    #[error("not sure enough: {}", together(.0))]
+    #[error("too uncertain: {}", together(.0))]
     Unsure(Vec<UnsureHeading>),
     /// The camera's mount is unknown.
-    #[error("nothing says where the camera is on the vehicle")]
+    #[error("the camera's mount on the vehicle is unknown")]
     NoMount,
     /// Too little of the road was measured.
     #[error(
@@ -98,13 +98,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn why_the_camera_is_not_judged_is_said() {
+    fn skip_reasons_have_their_messages() {
         let unsure = |angle| UnsureHeading {
             angle,
             off_deg: -0.44,
             std_error_deg: 0.71,
         };
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 CameraSkip::Heading(NoHeading {
                     straight: 1,
@@ -114,11 +114,11 @@ mod tests {
             ),
             (
                 CameraSkip::Unsure([HeadingAngle::Pitch, HeadingAngle::Yaw].map(unsure).into()),
-                "not sure enough: pitch of the direction of travel -0.4 ± 0.7 degrees, yaw of the direction of travel -0.4 ± 0.7 degrees",
+                "too uncertain: pitch of the direction of travel -0.4 ± 0.7 degrees, yaw of the direction of travel -0.4 ± 0.7 degrees",
             ),
             (
                 CameraSkip::NoMount,
-                "nothing says where the camera is on the vehicle",
+                "the camera's mount on the vehicle is unknown",
             ),
             (
                 CameraSkip::LittleRoad {
@@ -139,7 +139,7 @@ mod tests {
                 "too few points are seen by both cameras",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }
