@@ -254,7 +254,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn runs_are_alike_and_fill_up_no_more_than_they_must() {
+    fn runs_have_equal_lengths_and_as_little_padding_as_possible() {
         assert_eq!(run_length(1536, 160, 1), 128);
         assert_eq!(run_length(288, 160, 1), 144);
         assert_eq!(run_length(21, 160, 1), 21);

@@ -155,7 +155,7 @@ mod tests {
 
     /// The clamp on a GPU, which does not read the number, gives the same as that on the processor.
     #[test]
-    fn both_ways_hold_the_focal_length() {
+    fn both_ways_clamp_the_focal_length_alike() {
         let device = Device::flex().autodiff();
         let camera = AssumedCamera::default();
         let (least, most) = camera.ratios();

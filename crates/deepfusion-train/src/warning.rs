@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_a_camera_that_is_learned() {
+    fn warnings_about_a_learned_camera() {
         for (warning, said) in [
             (
                 TrainWarning::NoMeasuredTurns,
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn drives_that_know_less_are_counted() {
+    fn drives_with_missing_measurements_are_counted() {
         let no_turns = |others| {
             let drive = "monday".into();
             TrainWarning::NoTurns { drive, others }.to_string()
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_of_steps() {
+    fn warnings_about_steps() {
         for (warning, said) in [
             (
                 TrainWarning::StepSkipped {

@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn means_flags_and_differences() {
+    fn means_flags_and_differences_over_workers() {
         let mut values = [1.0, 3.0];
         among(&[3.0, 5.0]).mean(&mut values).unwrap();
         assert_eq!(values, [2.0, 4.0]);

@@ -101,7 +101,7 @@ fn depth_learns_the_same_without_pose_net() {
 
 /// The checkpoint has no PoseNet: requesting one is an error, and a run that starts from the checkpoint has a new one.
 #[test]
-fn its_checkpoint_has_none() {
+fn the_checkpoint_has_no_pose_net() {
     let folder = tempfile::tempdir().unwrap();
     let (config, train, validation) = small(&drive(&folder.path().join("street"), 10), 1);
     let without = settings(&config, false);

@@ -152,7 +152,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn they_compute_what_they_mean(
+    fn operations_equal_their_definitions(
         seed in any::<u64>(),
         (heads, each, expansion) in (1_usize..5, 1_usize..40, 1_usize..4),
         kernel in prop::sample::select(vec![1_usize, 3, 5]),

@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn features_are_taken_up_from_coarse_to_fine() {
+    fn features_are_read_from_coarse_to_fine() {
         use RefinementInput::{Again, Fine, Middle};
         let all = |iterations: usize| -> Vec<RefinementInput> {
             let config = RMsfmConfig { iterations };

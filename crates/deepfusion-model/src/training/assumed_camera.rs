@@ -146,7 +146,7 @@ mod tests {
     use crate::Preset;
 
     #[test]
-    fn a_learned_camera_can_be_held() {
+    fn a_learned_camera_can_be_fixed() {
         let camera = Intrinsics {
             fx: 400.0,
             fy: 420.0,
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_learned_stays_a_camera() {
+    fn the_limits_of_a_learned_camera_are_valid_cameras() {
         for hfov_deg in [5.0, 60.0, 165.0] {
             let camera = AssumedCamera {
                 hfov_deg,
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_camera_is_refused() {
+    fn invalid_cameras_are_refused() {
         let mut config = Preset::Tiny.config();
         assert!(!config.to_toml().unwrap().contains("assumed_camera"));
         config.set("assumed_camera.hfov_deg=75").unwrap();

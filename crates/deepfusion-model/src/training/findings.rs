@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn a_runs_file_holds_both_and_keeps_them_apart() {
+    fn a_runs_file_keeps_settings_and_findings_apart() {
         let (config, findings) = (config(), findings());
         let text = config.to_toml().unwrap() + &findings.to_toml().unwrap();
         assert!(text.contains("\n[findings]\n"), "{text}");
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_open_is_filled_in_and_what_is_set_stays() {
+    fn open_values_are_filled_in_and_set_values_stay() {
         let complete = findings().complete(config());
         assert_eq!(complete.pose_net.metres_per_unit, 0.8);
         assert_eq!(complete.canonical_focal_px, None);

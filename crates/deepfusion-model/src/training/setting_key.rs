@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn an_element_of_a_list_is_set_alone() {
+    fn one_element_of_a_list_can_be_set() {
         let mut set = config();
         put(&mut set, "frames[1]", Some(Value::Integer(2))).unwrap();
         put(&mut set, "data.sets[1].learn", Some("depth".into())).unwrap();
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_optional_and_not_there_can_be_taken_away() {
+    fn a_missing_optional_value_can_be_removed() {
         let mut same = config();
         for key in [
             "data.sets[0].range",
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_beyond_the_end_says_how_long_the_list_is() {
+    fn an_index_beyond_the_end_is_refused_with_the_lists_length() {
         let value = || Some(Value::Integer(1));
         assert_eq!(
             said("data.sets[2].learn", value()),
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn places_belong_to_lists_and_names_to_tables() {
+    fn indices_need_a_list_and_names_a_table() {
         let value = || Some(Value::Integer(1));
         assert_eq!(said("data[0].camera", value()), "`data` is not a list");
         assert_eq!(said("batch[0]", value()), "`batch` is not a list");
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_is_a_number_in_brackets() {
+    fn an_index_is_a_number_in_brackets() {
         for key in [
             "frames[one]",
             "frames[-1]",

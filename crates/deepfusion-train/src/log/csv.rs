@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_validation_says_what_best_is_chosen_by() {
+    fn validation_rows_have_the_value_that_best_is_chosen_by() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         let mut log = CsvLog::open(&path, 0).unwrap();
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_resumed_log_goes_on_where_the_checkpoint_was() {
+    fn a_resumed_log_continues_at_the_checkpoint() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         let write = |from: usize, steps: std::ops::RangeInclusive<usize>| {
@@ -156,7 +156,7 @@ mod tests {
 
     /// If a log of an earlier version lacks a column, its lines stay and the missing values are empty.
     #[test]
-    fn a_log_with_other_columns_goes_on_with_those_of_today() {
+    fn an_older_log_is_rearranged_into_the_current_columns() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         std::fs::write(&path, "step,total,split\n1,0.5,train\n2,0.4,train\n").unwrap();
