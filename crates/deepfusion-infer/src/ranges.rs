@@ -133,9 +133,9 @@ impl Histogram {
         let mut best = (f64::INFINITY, ends);
         for low in tried(ends[0]) {
             for high in tried(ends[1]) {
-                let lost = lost(&values, [low, high]);
-                if lost < best.0 {
-                    best = (lost, [low, high]);
+                let error = rounding_error(&values, [low, high]);
+                if error < best.0 {
+                    best = (error, [low, high]);
                 }
             }
         }
@@ -144,7 +144,7 @@ impl Histogram {
 }
 
 /// Error of the 255 steps of a range, as a sum of squares over the values.
-fn lost(values: &[(f64, f64)], [low, high]: [f64; 2]) -> f64 {
+fn rounding_error(values: &[(f64, f64)], [low, high]: [f64; 2]) -> f64 {
     let step = (high - low) / 255.0;
     let rounded = step * step / 12.0;
     let of = |value: f64| match value {

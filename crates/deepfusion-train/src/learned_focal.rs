@@ -46,9 +46,9 @@ impl LearnedFocal {
     /// Clamps on the device, so that a step on a GPU does not wait for the number to be read.
     fn clamped(self, least: f64, most: f64) -> Self {
         let (least, most) = (least.ln() as f32, most.ln() as f32);
-        let held = |log: Tensor<1>| log.inner().clamp(least, most).autodiff().require_grad();
+        let clamp = |log: Tensor<1>| log.inner().clamp(least, most).autodiff().require_grad();
         Self {
-            log_ratio: self.log_ratio.map(held),
+            log_ratio: self.log_ratio.map(clamp),
         }
     }
 

@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn warnings_about_a_learned_camera() {
-        for (warning, said) in [
+        for (warning, message) in [
             (
                 TrainWarning::NoMeasuredTurns,
                 "the camera is learned without measured turns: only sharp turns determine the focal length then; a yaw rate with \
@@ -128,7 +128,7 @@ mod tests {
                  focal length explains the images equally well; do not rely on the metres, nor on depth that is not straight ahead",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), message);
         }
     }
 
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn warnings_about_steps() {
-        for (warning, said) in [
+        for (warning, message) in [
             (
                 TrainWarning::StepSkipped {
                     frames: vec!["monday/7".into(), "monday/9".into()],
@@ -186,7 +186,7 @@ mod tests {
                  (`loss.moving.warmup_share`) lets depth learn first",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), message);
         }
     }
 }

@@ -89,7 +89,7 @@ fn each_pair_is_treated_by_what_is_known_of_its_drive() {
     assert!((vehicle.reprojection - distance.reprojection).abs() > 1e-4);
     assert!((vehicle.speed - distance.speed).abs() > 1e-3);
     same("known", &[of(None)], &[vehicle]);
-    same("known, said so", &[of(Some([1.0, 1.0]))], &[vehicle]);
+    same("known, with a mask", &[of(Some([1.0, 1.0]))], &[vehicle]);
     same("unknown", &[of(Some([0.0, 0.0]))], &[distance]);
     let halves = [of(Some([1.0, 0.0])), of(Some([0.0, 1.0]))];
     same("one of each", &halves, &[vehicle, distance]);

@@ -326,12 +326,12 @@ fn views_are_warped_by_the_configured_motion() {
             let here = of(motion, 20.0, 1);
             for (other, matters) in [(of(motion, 400.0, 1), length), (of(motion, 20.0, 2), net)] {
                 let difference = (here - other).abs();
-                let as_said = if matters {
+                let as_expected = if matters {
                     difference > 1e-4
                 } else {
                     difference < 1e-6
                 };
-                assert!(as_said, "{motion:?} {compare_at:?}: {here} {other}");
+                assert!(as_expected, "{motion:?} {compare_at:?}: {here} {other}");
             }
         }
     }

@@ -75,7 +75,7 @@ pub enum GraphProblem {
         epsilon: f32,
     },
     /// A number of channels that is not divisible into queries, keys and values of the heads.
-    #[error("{} for 3 times {}", count_of(*channels, "channel"), count_of(*heads, "head"))]
+    #[error("{} of input, expected a multiple of 3 × {heads} (queries, keys and values of {})", count_of(*channels, "channel"), count_of(*heads, "head"))]
     Heads {
         /// Number of channels of the input.
         channels: usize,
@@ -89,7 +89,7 @@ pub enum GraphProblem {
         per_axis: usize,
     },
     /// A number of channels that is not divisible by the four pixels of a block.
-    #[error("{} for 2×2 pixels", count_of(*channels, "channel"))]
+    #[error("{} of input, expected a multiple of 4 (2×2 pixels)", count_of(*channels, "channel"))]
     ChannelsForPixels {
         /// Number of channels of the input.
         channels: usize,

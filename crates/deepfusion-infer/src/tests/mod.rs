@@ -194,8 +194,8 @@ impl ConvForm<crate::element::Bf16> for WithoutMatrixUnit {
         self.0.geometry()
     }
 
-    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
-        self.0.reads_on()
+    fn reads_beyond_inputs(&self) -> Option<(&Geometry, &Runs)> {
+        self.0.reads_beyond_inputs()
     }
 
     unsafe fn run(&self, arena: Shared<crate::element::Bf16>) {

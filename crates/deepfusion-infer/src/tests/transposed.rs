@@ -100,7 +100,7 @@ fn channels_that_do_not_divide_into_pixels_are_refused() {
         let error = b.graph.clone().push("op", op).unwrap_err().to_string();
         assert!(error.contains(why), "{error}");
     };
-    refused(half, "6 channels for 2×2 pixels");
+    refused(half, "6 channels of input, expected a multiple of 4");
     refused(ValueId::IMAGE, "3 channels");
     let full = b.conv(ValueId::IMAGE, 8, |_| ());
     let error = b.graph.push("op", Op::DepthToSpace { input: full });

@@ -38,7 +38,7 @@ impl Default for AssumedCamera {
 impl AssumedCamera {
     /// The fixed assumed camera that is as wide as a learned one.
     #[must_use]
-    pub fn held(k: &Intrinsics) -> Self {
+    pub fn fixed(k: &Intrinsics) -> Self {
         let half = f64::from(k.width.max(k.height)) / 2.0 / k.fx;
         Self {
             hfov_deg: 2.0 * half.atan().to_degrees(),
@@ -155,9 +155,9 @@ mod tests {
             width: 640,
             height: 192,
         };
-        let held = AssumedCamera::held(&camera);
-        assert!(!held.learn);
-        let again = held.intrinsics();
+        let fixed = AssumedCamera::fixed(&camera);
+        assert!(!fixed.learn);
+        let again = fixed.intrinsics();
         let scale = 640.0 / f64::from(again.width);
         assert!((again.fx * scale - 400.0).abs() < 1e-9, "{again:?}");
         assert!((again.fy * scale - 420.0).abs() < 1e-9, "{again:?}");
@@ -178,7 +178,7 @@ mod tests {
                     fx: k.fx * ratio,
                     ..k
                 };
-                let view = AssumedCamera::held(&learned).hfov_deg;
+                let view = AssumedCamera::fixed(&learned).hfov_deg;
                 let (from, to) = (hfov_deg.min(10.0), hfov_deg.max(160.0));
                 assert!((from - 1e-9..=to + 1e-9).contains(&view), "{view}");
             }

@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn a_misspelt_key_is_named_with_a_suggestion() {
-        let said = |assignment: &str| {
+        let message = |assignment: &str| {
             let mut config = Preset::Light.config();
             config.set(assignment).unwrap_err().to_string()
         };
@@ -170,10 +170,10 @@ mod tests {
             ),
             ("hope=1", "hope=1: there is no key `hope`"),
         ] {
-            assert_eq!(said(assignment), expected);
+            assert_eq!(message(assignment), expected);
         }
         // The key exists, but the value is invalid.
-        assert!(!said("batch=many").contains("there is no key"));
+        assert!(!message("batch=many").contains("there is no key"));
     }
 
     #[test]

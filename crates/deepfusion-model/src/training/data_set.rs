@@ -243,7 +243,7 @@ impl TrainConfig {
 
     /// The data set of the given name. Without a name: the only set; or, if all sets share one depth range, the only set whose motion is
     /// learned, since a depth means the same metres in all of them.
-    pub(crate) fn set_meant(&self, name: Option<&str>) -> Option<&DataSetConfig> {
+    pub(crate) fn selected_set(&self, name: Option<&str>) -> Option<&DataSetConfig> {
         let sets = self.data.sets.as_slice();
         if let Some(name) = name {
             return sets.iter().find(|s| s.name == name);
@@ -270,7 +270,7 @@ impl TrainConfig {
         if self.data.sets.is_empty() && name.is_none() {
             return Ok(self);
         }
-        let Some(set) = self.set_meant(name).cloned() else {
+        let Some(set) = self.selected_set(name).cloned() else {
             let mut names: Vec<String> = self.data.sets.iter().map(|s| s.name.clone()).collect();
             let expected = match names.len() {
                 0 => ExpectedDataSet::NoSets,

@@ -112,8 +112,8 @@ impl TrainFindings {
     /// The camera that a data set was trained with; `set` as for [`TrainConfig::for_set`].
     #[must_use]
     pub fn camera_of(&self, config: &TrainConfig, set: Option<&str>) -> Option<Intrinsics> {
-        let meant = config.set_meant(set);
-        let own = meant.and_then(|meant| self.set(&meant.name));
+        let selected = config.selected_set(set);
+        let own = selected.and_then(|selected| self.set(&selected.name));
         own.and_then(|own| own.camera).or(self.camera)
     }
 

@@ -41,7 +41,7 @@ fn header() -> String {
 }
 
 /// A line of a log that another version may have begun, rearranged into the current columns. Missing values are empty.
-fn arranged(columns: &str, line: &str) -> String {
+fn rearranged(columns: &str, line: &str) -> String {
     let values: HashMap<&str, &str> = columns.split(',').zip(line.split(',')).collect();
     let header = header();
     let of = |name| values.get(name).copied().unwrap_or_default();
@@ -65,7 +65,7 @@ impl CsvLog {
                 let line = line.map_err(io("read"))?;
                 let of = line.split(',').next().and_then(|s| s.parse::<usize>().ok());
                 if of.is_some_and(|of| of <= step) {
-                    kept.push(arranged(&columns, &line));
+                    kept.push(rearranged(&columns, &line));
                 }
             }
         }

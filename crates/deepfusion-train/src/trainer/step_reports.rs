@@ -173,9 +173,9 @@ impl Trainer {
         let mut control = Control::Continue;
         for ((step, unread), read) in waiting.into_iter().zip(read) {
             let figures = unread.figures(&read, share, step.number)?;
-            let said = (figures, read.outcome());
+            let outcome = (figures, read.outcome());
             // After a request to stop, steps that were already made are still reported.
-            if self.report_step(reports, step, said, seconds, listen)? == Control::Stop {
+            if self.report_step(reports, step, outcome, seconds, listen)? == Control::Stop {
                 control = Control::Stop;
             }
         }
