@@ -163,10 +163,16 @@ mod tests {
             let focal = || LearnedFocal {
                 log_ratio: Param::from_data(TensorData::from([log_ratio]), &device),
             };
-            let held = focal().clamped_to(&camera).ratio();
+            let on_host = focal().clamped_to(&camera).ratio();
             let clamped = focal().clamped(least, most);
-            assert!((clamped.ratio() - held).abs() < 1e-5 * held, "{held}");
-            assert!((held - expected).abs() < 1e-5 * held, "{held} {expected}");
+            assert!(
+                (clamped.ratio() - on_host).abs() < 1e-5 * on_host,
+                "{on_host}"
+            );
+            assert!(
+                (on_host - expected).abs() < 1e-5 * on_host,
+                "{on_host} {expected}"
+            );
             assert!(
                 clamped.log_ratio.val().is_require_grad(),
                 "it still requires its gradient"

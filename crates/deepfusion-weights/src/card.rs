@@ -38,7 +38,7 @@ pub struct Card {
     pub numbers: String,
     /// Largest |packed − original| / original of the depths of a picture: the cost of rounding the numbers.
     pub depth_difference: f64,
-    /// Anything else worth knowing.
+    /// Further notes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
     /// Evaluations of the checkpoint before it was packed.

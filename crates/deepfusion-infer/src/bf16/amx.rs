@@ -336,7 +336,7 @@ impl Product<'_> {
     #[inline(always)]
     unsafe fn two_by_one(&self, sums: &mut [f32]) {
         let rows = self.checked(1, sums);
-        // SAFETY: as there.
+        // SAFETY: as in [`Self::two_by_two`].
         unsafe {
             asm!(
                 "test {left}, {left}",

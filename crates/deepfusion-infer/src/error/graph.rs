@@ -127,7 +127,9 @@ pub enum Misfit {
         input: ValueShape,
     },
     /// The operand for every pixel is not a single pixel, or has other channels.
-    #[error("{pixel:?} at every pixel of {input:?}, expected a single pixel of as many channels")]
+    #[error(
+        "{pixel:?} at every pixel of {input:?}, expected a single pixel with the same number of channels"
+    )]
     Pixel {
         /// Shape of the operand for every pixel.
         pixel: ValueShape,
