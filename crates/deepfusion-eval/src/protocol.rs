@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_garg_window_of_a_kitti_image_is_the_fields() {
+    fn the_garg_crop_equals_the_usual_one() {
         // Monodepth2 and its successors print [153, 371) × [44, 1197) for 375×1242.
         assert_eq!(Crop::Garg.window(1242, 375), (153..371, 44..1197));
         assert_eq!(Crop::None.window(1242, 375), (0..375, 0..1242));
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_field_must_be_is_said() {
+    fn expected_settings_as_text() {
         let with = |min_m, cap_m, scaling| Protocol {
             min_m,
             cap_m,

@@ -124,7 +124,7 @@ fn missing_and_extra_names_are_errors() {
 }
 
 #[test]
-fn broken_files_say_what_is_wrong() {
+fn errors_of_broken_files_name_the_problem() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let message = |error: Error| {
@@ -227,7 +227,7 @@ fn the_table_with_drawn_points() {
 }
 
 #[test]
-fn images_without_any_ground_truth_are_told_from_masked_ones() {
+fn images_without_ground_truth_are_distinguished_from_masked_ones() {
     let evaluator = Evaluator::new(Protocol::default()).unwrap();
     let error = evaluator.report().unwrap_err().to_string();
     assert_eq!(error, "nothing to compare with: no image has ground truth");

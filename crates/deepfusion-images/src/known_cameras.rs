@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_lens_tells_the_main_camera_from_the_others() {
+    fn the_lens_distinguishes_the_main_camera_from_the_others() {
         let found =
             |model, lens_mm| KnownCamera::find("Apple", model, lens_mm).map(KnownCamera::film_mm);
         assert_eq!(found("iPhone 12", 4.2), Some(26.0));

@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_numbers_tell_their_unit_or_do_not() {
+    fn the_unit_of_plain_numbers_is_inferred_or_unknown() {
         let style = |words: &[&str], unit| style_of(words, unit);
         assert_eq!(
             style(&["0", "0.5", "1"], None),
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_users_moment_is_on_the_logs_clock() {
+    fn a_users_time_is_on_the_logs_clock() {
         let noon = 1_569_153_600 * SECOND;
         let midnight = noon - 12 * 3600 * SECOND;
         for (word, clock, ns) in [
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_moment_past_midnight_is_on_the_next_day() {
+    fn a_time_past_midnight_is_on_the_next_day() {
         let day = DAY_NS / SECOND;
         for (first_s, word, clock, expected_s) in [
             (day - 10, "00:00:10", Clock::TimeOfDay, day + 10),
@@ -318,14 +318,14 @@ mod tests {
     }
 
     #[test]
-    fn a_moment_of_a_long_day_is_within_the_log() {
+    fn a_time_of_a_long_day_is_within_the_log() {
         let (morning, evening) = (6 * 3600 * SECOND, 20 * 3600 * SECOND);
         let ns = time_on_clock("19:00:00", Clock::Date, (morning, evening), 0);
         assert_eq!(ns, Some(19 * 3600 * SECOND));
     }
 
     #[test]
-    fn a_moment_of_a_local_clock_is_in_its_zone() {
+    fn a_time_of_a_local_clock_is_in_its_zone() {
         let (noon, zone_s) = (1_569_153_600 * SECOND, 7200);
         // The log begins at 14:00 local time.
         let first = noon + 7200 * SECOND;
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn several_rows_of_one_moment_are_no_step() {
+    fn rows_with_equal_times_do_not_affect_the_unit() {
         let words = ["0", "0", "0", "500", "500", "500", "1000", "1000"];
         assert_eq!(style_of(&words, None), None);
         let seconds = ["0", "0", "0.5", "0.5", "1"];

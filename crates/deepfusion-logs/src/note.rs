@@ -52,7 +52,7 @@ mod tests {
 
     /// One of each kind. All notes of a kind are tested beside it.
     #[test]
-    fn a_note_says_what_its_kind_says() {
+    fn a_note_prints_the_text_of_its_kind() {
         let of_table = LogNote::from(TableNote::HeaderAgain { more: 1 });
         let notes: [LogNote; 7] = [
             of_table.clone(),

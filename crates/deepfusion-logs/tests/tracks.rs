@@ -47,7 +47,7 @@ fn a_gpx_track_gives_speeds_at_its_dates() {
 }
 
 #[test]
-fn a_speed_in_an_extension_counts() {
+fn a_speed_in_an_extension_is_used() {
     let extension = |i: usize| {
         format!(
             "<extensions><gpxtpx:TrackPointExtension><gpxtpx:speed>{}.5</gpxtpx:speed></gpxtpx:TrackPointExtension></extensions>",
@@ -63,7 +63,7 @@ fn a_speed_in_an_extension_counts() {
 
 /// iOS writes -1 for an unknown speed; OsmAnd writes none if it is 0.
 #[test]
-fn a_point_without_a_speed_leaves_the_others_theirs() {
+fn a_point_without_a_speed_does_not_discard_the_others() {
     for unknown in ["<speed>-1</speed>", ""] {
         let speed = |i: usize| {
             let own = format!("<speed>{i}.5</speed>");
@@ -79,7 +79,7 @@ fn a_point_without_a_speed_leaves_the_others_theirs() {
 }
 
 #[test]
-fn what_is_wrong_with_a_track_is_named_by_line() {
+fn errors_in_a_track_name_the_line() {
     let good = track(5, 1e-4, |_| String::new());
     for (bad, expected) in [
         (

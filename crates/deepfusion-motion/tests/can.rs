@@ -28,7 +28,7 @@ fn bytes(hex: &str) -> Vec<u8> {
 }
 
 #[test]
-fn every_signal_is_what_cantools_decodes() {
+fn every_signal_equals_cantools() {
     let frames: Vec<Frame> = serde_json::from_str(include_str!("reference/dbc.json")).unwrap();
     let dbc = Dbc::parse(DBC).unwrap();
     let (mut there, mut absent) = (0, 0);
@@ -63,7 +63,7 @@ fn every_signal_is_what_cantools_decodes() {
 }
 
 #[test]
-fn names_units_and_what_is_not_there() {
+fn names_units_and_unknown_signals() {
     let dbc = Dbc::parse(DBC).unwrap();
     assert!(dbc.names().any(|n| n == "STEER_ANGLE_SENSOR.STEER_ANGLE"));
     assert_eq!(dbc.unit("POWERTRAIN_DATA.XMISSION_SPEED"), Some("km/h"));

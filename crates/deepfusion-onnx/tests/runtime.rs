@@ -38,7 +38,7 @@ fn library_is_here() -> bool {
 }
 
 #[test]
-fn random_networks_are_what_the_reference_says() {
+fn random_networks_equal_the_reference() {
     if !library_is_here() {
         return;
     }

@@ -177,7 +177,7 @@ mod tests {
     use deepfusion_hint::Hint;
 
     #[test]
-    fn settings_that_cannot_be_are_named() {
+    fn invalid_settings_are_named() {
         assert!(PerceptionConfig::default().validate().is_ok());
         assert!(PerceptionConfig::predicted().validate().is_ok());
         let base = PerceptionConfig::default;
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_setting_may_be_is_said() {
+    fn expected_settings_as_text() {
         for (expected, said) in [
             (Expected::AboveZero, "a number above 0"),
             (Expected::NotNegative, "a number of at least 0"),

@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_made_once_and_anew_for_another_video() {
+    fn frames_are_decoded_once_and_again_for_another_video() {
         let folder = tempfile::tempdir().unwrap();
         let (cache, origin) = video(folder.path(), 3);
         let never = |_: &Path| -> Result<()> { panic!("the frames exist already") };
@@ -248,7 +248,7 @@ mod tests {
 
     /// Two drives whose cameras' files have the same name, with one folder for the frames of both.
     #[test]
-    fn videos_of_one_name_share_no_frames() {
+    fn videos_with_the_same_name_share_no_frames() {
         let root = tempfile::tempdir().unwrap();
         let scratch = root.path().join("scratch");
         let kept = ["monday", "tuesday"].map(|day| {
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_a_videos_until_it_changes() {
+    fn frames_are_valid_until_their_video_changes() {
         let root = tempfile::tempdir().unwrap();
         let file = root.path().join("front.mp4");
         std::fs::write(&file, "x").unwrap();
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_of_before_stay_valid_beside_their_video() {
+    fn frames_of_older_versions_stay_valid_beside_their_video() {
         let folder = tempfile::tempdir().unwrap();
         let (_, origin) = video(folder.path(), 3);
         let text = serde_json::to_string(&origin).unwrap();
@@ -324,7 +324,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_leads_to_where_there_is_room() {
+    fn a_linked_cache_is_filled_through_the_link() {
         let folder = tempfile::tempdir().unwrap();
         let (cache, origin) = video(folder.path(), 3);
         let disk = folder.path().join("disk/frames");
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fails_leaves_nothing_and_other_files_are_not_replaced() {
+    fn a_failure_leaves_nothing_and_other_files_are_not_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let (cache, origin) = video(folder.path(), 3);
         let fails = |part: &Path| -> Result<()> {

@@ -90,7 +90,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn what_failed_once_is_not_tried_again() {
+    fn a_failure_is_not_retried_at_once() {
         let decoded = Decoded::default();
         let full = || Error::file(Path::new("cache"), ErrorKind::StorageFull.into());
         let first = decoded.once(|| Err(full())).unwrap_err();
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn what_failed_is_tried_again_later_a_few_times() {
+    fn a_failure_is_retried_a_few_times_later() {
         let full = Error::file(Path::new("cache"), ErrorKind::StorageFull.into());
         let refusal = Refusal::of(&full, 1);
         assert!(!refusal.is_to_be_tried(PAUSE));
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_decoded_is_decoded_once() {
+    fn decoding_happens_once() {
         let decoded = Decoded::default();
         let mut times = 0;
         for _ in 0..3 {

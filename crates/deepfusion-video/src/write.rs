@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_of_a_list_is_named_twice() {
+    fn the_last_picture_is_listed_twice() {
         let shown = |file: &str| VideoPicture {
             file: file.into(),
             seconds: 0.04,

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_a_trace() {
+    fn notes_on_a_trace_as_text() {
         for (note, said) in [
             (
                 CanNote::Signal {

@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_fixes() {
+    fn notes_on_fixes_as_text() {
         let speeds = |measured| FixesNote::Speeds {
             measured,
             sigma_mps: 0.123,

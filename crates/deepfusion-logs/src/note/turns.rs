@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_turns() {
+    fn notes_on_turns_as_text() {
         let about = TurnsNote::AboutGravity;
         for (note, said) in [
             (

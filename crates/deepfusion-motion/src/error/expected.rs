@@ -111,7 +111,7 @@ mod tests {
     use super::{ExpectedLayout, ExpectedSetting as Expected};
 
     #[test]
-    fn a_setting_is_said_in_words_with_its_unit() {
+    fn expected_settings_as_text_with_their_unit() {
         let (from, to) = (0.05, 60.0);
         for (expected, said) in [
             (Expected::AboveZero, "above 0"),
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_layout_is_said_in_bits_and_bytes() {
+    fn expected_layouts_as_text_in_bits_and_bytes() {
         for (expected, said) in [
             (ExpectedLayout::Bits { from: 1, to: 64 }, "1 to 64 bits"),
             (ExpectedLayout::FloatBits(32), "32 bits for float32"),

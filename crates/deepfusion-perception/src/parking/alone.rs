@@ -47,7 +47,7 @@ mod tests {
     use crate::parking::scene::{Scene, person};
 
     #[test]
-    fn what_is_hidden_on_a_side_or_large_does_not_stand_alone() {
+    fn hidden_or_large_objects_do_not_stand_alone() {
         let small = person([0.0, 12.0]);
         let mut beside = person([-0.7, 10.0]);
         let alone = |boxes: &[_]| {

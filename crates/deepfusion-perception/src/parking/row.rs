@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn both_sides_of_a_lane_are_rows_and_a_car_in_it_is_none() {
+    fn both_sides_of_a_lane_are_rows_but_a_car_in_it_is_not() {
         let cars = [
             car(6.0, 4.0, 0.0),
             car(-6.1, 6.0, 0.0),
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_goes_on_as_its_cars_are_turned() {
+    fn a_row_continues_in_the_direction_of_its_cars() {
         let row = Row::through(vec![car(5.0, 5.0, 0.1), car(5.3, 8.0, 0.1)]);
         assert!((row.slope(10.0) - 0.1).abs() < 0.02, "{row:?}");
         let [along, off] = row.locate([row.at(10.0) + 1.0, 10.0]);
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_bends_as_what_drives_along_the_lane_shows() {
+    fn a_row_bends_with_vehicles_along_the_lane() {
         let mut row = Row::through(vec![car(6.0, 2.0, 0.0), car(6.0, 5.0, 0.0)]);
         let straight = row.at(24.0);
         row.keep_to(&[Heading {
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_bends_as_the_one_across_the_lane_does() {
+    fn a_row_bends_like_the_one_across_the_lane() {
         // A bend of 40 m radius; the left row shows more of it.
         let turn = |forward: f32| forward / 40.0;
         let on = |right: f32, forward: f32| {

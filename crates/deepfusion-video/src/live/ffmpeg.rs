@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_last_words_are_kept() {
+    fn only_the_last_lines_are_kept() {
         let said = Mutex::new(VecDeque::new());
         let text: String = (0..50).map(|i| format!("line {i}\n\n")).collect();
         listen(text.as_bytes(), &said);

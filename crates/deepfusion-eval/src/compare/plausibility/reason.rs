@@ -125,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_against_figures() {
+    fn reasons_against_figures_as_text() {
         let cap_m = 80.0;
         for (reason, said) in [
             (
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_reader_must_know_is_said() {
+    fn notes_for_readers_as_text() {
         for (reason, said) in [
             (
                 FlagReason::Outdated {
