@@ -283,18 +283,18 @@ pub struct IntervalRange {
 mod tests {
     use super::*;
 
-    /// Quantiles of a Laplace distribution with scale `true_scale` as errors, from a network that predicts the scale `said`.
+    /// Quantiles of a Laplace distribution with scale `true_scale` as errors, from a network that predicts the scale `predicted_scale`.
     fn samples(
         n: usize,
         true_scale: f64,
-        said: f64,
+        predicted_scale: f64,
         depth_m: f64,
         drive: usize,
     ) -> Vec<IntervalSample> {
         (0..n)
             .map(|i| IntervalSample {
                 depth_m,
-                scale: said,
+                scale: predicted_scale,
                 error: -true_scale * (1.0 - (i as f64 + 0.5) / n as f64).ln(),
                 drive,
             })
@@ -323,13 +323,13 @@ mod tests {
     #[test]
     fn a_well_calibrated_network_needs_no_correction() {
         let drive = samples(20_000, 0.2, 0.2, 15.0, 0);
-        let said = IntervalFactors::uncalibrated();
-        let measured = said.measure(&drive).unwrap();
+        let uncalibrated = IntervalFactors::uncalibrated();
+        let measured = uncalibrated.measure(&drive).unwrap();
         assert!(!measured.calibrated);
         let found = IntervalFactors::calibrate(&drive).unwrap();
         for (i, row) in measured.levels.iter().enumerate() {
             assert!((row.coverage - row.level).abs() < 1e-3, "{row:?}");
-            assert!((found.at(15.0)[i] / said.at(15.0)[i] - 1.0).abs() < 2e-3);
+            assert!((found.at(15.0)[i] / uncalibrated.at(15.0)[i] - 1.0).abs() < 2e-3);
         }
         assert!((found.stretch(15.0) - 1.0).abs() < 2e-3);
         // Half of all errors are below b·ln 2: the interval's relative width is 2·sinh(b·ln 2).

@@ -208,7 +208,7 @@ mod tests {
             scaling,
             ..Protocol::default()
         };
-        for (protocol, said) in [
+        for (protocol, text) in [
             (
                 with(0.0, 80.0, Scaling::None),
                 "the minimum depth is 0: expected metres above 0",
@@ -222,7 +222,7 @@ mod tests {
                 "the fixed scale is -1: expected a factor above 0",
             ),
         ] {
-            assert_eq!(protocol.validate().unwrap_err().to_string(), said);
+            assert_eq!(protocol.validate().unwrap_err().to_string(), text);
         }
     }
 }

@@ -112,7 +112,7 @@ fn published_rows_in_every_format() {
 #[test]
 fn each_kind_of_truth_has_its_own_published_protocol() {
     let folder = tempfile::tempdir().unwrap();
-    let said = |name: &str, protocol: Protocol| {
+    let notes_of = |name: &str, protocol: Protocol| {
         let run = run(folder.path(), name, "kitti", report(1.1, 0.0, protocol));
         run_tables(&collect(&[run])).tables[0].notes.join("\n")
     };
@@ -122,14 +122,14 @@ fn each_kind_of_truth_has_its_own_published_protocol() {
         ..Protocol::default()
     };
     let benchmark = "improved ground truth: 2 images instead of 652";
-    let whole = said("whole", of(GroundTruth::Annotated, Crop::None));
+    let whole = notes_of("whole", of(GroundTruth::Annotated, Crop::None));
     assert!(whole.contains(&format!("{benchmark}.")), "{whole}");
-    let cropped = said("cropped", of(GroundTruth::Annotated, Crop::Garg));
+    let cropped = notes_of("cropped", of(GroundTruth::Annotated, Crop::Garg));
     assert!(
         cropped.contains(&format!("{benchmark}, Garg's crop instead")),
         "{cropped}"
     );
-    let recorded = said("recorded", of(GroundTruth::Velodyne, Crop::Garg));
+    let recorded = notes_of("recorded", of(GroundTruth::Velodyne, Crop::Garg));
     assert!(
         recorded.contains("Eigen tables: 2 images instead of 697."),
         "{recorded}"

@@ -124,8 +124,8 @@ mod tests {
     fn a_separate_exif_block_gives_the_same_camera() {
         let bytes = jpeg(&[(Tag::FocalLengthIn35mmFilm, 26)]);
         // After the marker and the length of APP1; what follows the block is skipped.
-        let said = crate::exif_block_camera(&bytes[6..], (64, 48)).unwrap();
-        assert_eq!(Some(said.intrinsics), load(&bytes).intrinsics);
+        let camera = crate::exif_block_camera(&bytes[6..], (64, 48)).unwrap();
+        assert_eq!(Some(camera.intrinsics), load(&bytes).intrinsics);
         assert_eq!(crate::exif_block_camera(b"no block", (64, 48)), None);
     }
 

@@ -105,8 +105,8 @@ pub(crate) fn clock_of(word: &str, style: TimeStyle) -> Clock {
 
 /// A time as a user writes it, in nanoseconds on a log's clock: seconds as a number, a date, or a time of day. A date without a zone is
 /// in the log's own zone. A time of day is the one within the log, whose first and last times are `span_ns`, or the nearest to it. For a
-/// log of local dates, `span_ns` is on its clock before [`in_zone`](crate::DriveLog::in_zone) and the result on the one after it, which
-/// is `zone_s` ahead of UTC.
+/// log of local dates, `zone_s` seconds ahead of UTC, `span_ns` is on the local clock and the result in UTC, as after
+/// [`in_zone`](crate::DriveLog::in_zone).
 #[must_use]
 pub fn time_on_clock(word: &str, clock: Clock, span_ns: (i64, i64), zone_s: i64) -> Option<i64> {
     let word = word.trim();

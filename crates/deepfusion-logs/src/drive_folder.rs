@@ -325,7 +325,7 @@ mod tests {
                 fine,
                 "a refused folder leaves nothing behind"
             );
-            let target = target.with_extension("said");
+            let target = target.with_extension("given");
             folder(&log, Some(first_ns)).write(&target).unwrap();
         }
     }
@@ -343,7 +343,7 @@ mod tests {
     fn dates_without_a_zone_give_a_note() {
         let out = tempfile::tempdir().unwrap();
         let images = || Media::Images("images".into());
-        for (name, clock, media, said) in [
+        for (name, clock, media, expected) in [
             ("a", Clock::LocalDate, images(), Some(ClockNote::LocalDates)),
             ("b", Clock::Date, images(), None),
             (
@@ -359,8 +359,8 @@ mod tests {
                 ..folder(&log, None)
             };
             let notes = drive.write(&out.path().join(name)).unwrap();
-            let said: Vec<LogNote> = said.into_iter().map(LogNote::from).collect();
-            assert_eq!(notes, said, "{name}");
+            let expected: Vec<LogNote> = expected.into_iter().map(LogNote::from).collect();
+            assert_eq!(notes, expected, "{name}");
         }
     }
 

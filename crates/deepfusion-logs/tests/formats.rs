@@ -78,8 +78,8 @@ fn a_row_that_goes_back_is_left_out() {
     let log = read_with(&[50]).unwrap();
     assert_eq!((log.speeds.len(), log.yaw_rates.len()), (199, 199));
     assert!(log.speeds.iter().all(|speed| speed.mps != 50.0));
-    let said = LogNote::from(TableNote::Backwards { back: 1, rows: 200 });
-    let times = log.notes.iter().filter(|note| **note == said);
+    let expected = LogNote::from(TableNote::Backwards { back: 1, rows: 200 });
+    let times = log.notes.iter().filter(|note| **note == expected);
     assert_eq!(times.count(), 1, "{:?}", log.notes);
     let error = read_with(&[50, 60, 70]).unwrap_err().to_string();
     assert!(error.contains("trip.csv:52: "), "{error}");
@@ -101,11 +101,11 @@ fn only_the_row_that_jumps_ahead_is_lost() {
     assert_eq!((log.speeds.len(), log.yaw_rates.len()), (199, 199));
     assert!(log.speeds.iter().all(|speed| speed.mps != 197.0));
     assert_eq!(log.speeds[198].mps, 199.0);
-    let said = LogNote::from(TableNote::Ahead {
+    let expected = LogNote::from(TableNote::Ahead {
         ahead: 1,
         rows: 200,
     });
-    let times = log.notes.iter().filter(|note| **note == said);
+    let times = log.notes.iter().filter(|note| **note == expected);
     assert_eq!(times.count(), 1, "{:?}", log.notes);
 }
 
@@ -183,8 +183,8 @@ fn car_scanner_has_one_value_per_row_and_decimal_commas() {
     let log = plain("car_scanner.csv");
     assert_eq!((log.format, log.clock), (Format::TallTable, Clock::Free));
     speeds_are_true(&log, 43_200_250_000_000, 49, 1e-4);
-    let said = log.notes[0].to_string();
-    assert!(said.contains("'Vehicle speed' in mph"), "{said}");
+    let note = log.notes[0].to_string();
+    assert!(note.contains("'Vehicle speed' in mph"), "{note}");
 }
 
 #[test]
@@ -279,13 +279,13 @@ fn turns_without_a_zone_are_taken_as_utc_with_a_note() {
         let read = read_all(&logs, &ReadOptions::default(), zone_s).unwrap();
         read.unwrap().0
     };
-    let said = LogNote::OfFile {
+    let expected = LogNote::OfFile {
         file: "turns.csv".into(),
         note: Box::new(ClockNote::LocalDates.into()),
     };
-    assert!(read(None).notes.contains(&said));
+    assert!(read(None).notes.contains(&expected));
     let in_zone = read(Some(7200));
-    assert!(!in_zone.notes.contains(&said));
+    assert!(!in_zone.notes.contains(&expected));
     assert_eq!(in_zone.yaw_rates[0].ns, NOON_NS);
 }
 
@@ -458,8 +458,8 @@ fn damaged_logs_are_named_by_line_and_column() {
             let path = folder.path().join(name);
             std::fs::write(&path, text).unwrap();
             let log = read(&path, &ReadOptions::default()).unwrap();
-            let said = log.notes[0].to_string();
-            assert!(said.contains(expected), "{said}");
+            let note = log.notes[0].to_string();
+            assert!(note.contains(expected), "{note}");
             continue;
         }
         let error = changed(name, |text| text.replace(from, to));

@@ -37,8 +37,8 @@ fn a_gpx_track_gives_speeds_at_its_dates() {
     // A degree of latitude is 111.2 km there: 10 m/s.
     let log = read("a.gpx", &track(30, 10.0 / 111_206.0, |_| String::new())).unwrap();
     assert_eq!(log.speeds.len(), 30);
-    let said = log.notes[0].to_string();
-    assert!(said.contains("from its positions"), "{said}");
+    let note = log.notes[0].to_string();
+    assert!(note.contains("from its positions"), "{note}");
     assert_eq!(log.speeds[0].ns, 1_777_636_800_250_000_000);
     assert_eq!(log.speeds[1].ns - log.speeds[0].ns, 1_000_000_000);
     for speed in &log.speeds {
@@ -55,8 +55,8 @@ fn a_speed_in_an_extension_is_used() {
         )
     };
     let log = read("a.gpx", &track(5, 1e-4, extension)).unwrap();
-    let said = log.notes[0].to_string();
-    assert!(said.contains("as the receiver measured"), "{said}");
+    let note = log.notes[0].to_string();
+    assert!(note.contains("as the receiver measured"), "{note}");
     let speeds: Vec<f64> = log.speeds.iter().map(|s| s.mps).collect();
     assert_eq!(speeds, [0.5, 1.5, 2.5, 3.5, 4.5]);
 }
@@ -72,9 +72,9 @@ fn a_point_without_a_speed_does_not_discard_the_others() {
         let log = read("a.gpx", &track(5, 0.0, speed)).unwrap();
         let speeds: Vec<f64> = log.speeds.iter().map(|s| s.mps).collect();
         assert_eq!(speeds, [0.0, 1.5, 2.5, 3.5, 4.5], "{unknown}");
-        let said: Vec<String> = log.notes.iter().map(ToString::to_string).collect();
-        assert!(said[0].contains("as the receiver measured"), "{said:?}");
-        assert!(said[1].ends_with("1 of 5 fixes"), "{said:?}");
+        let notes: Vec<String> = log.notes.iter().map(ToString::to_string).collect();
+        assert!(notes[0].contains("as the receiver measured"), "{notes:?}");
+        assert!(notes[1].ends_with("1 of 5 fixes"), "{notes:?}");
     }
 }
 

@@ -215,16 +215,20 @@ impl FusedTrack {
         let (mut s, mut g, mut ss, mut sg) = (0.0, 0.0, 0.0, 0.0);
         for (times, rate) in gyro.times_s().windows(2).zip(gyro.values()) {
             let step_s = times[1] - times[0];
-            let (Some(said), Some(speed)) = (steering.at(times[0]), self.speed_at(times[0])) else {
+            let (Some(steered), Some(speed)) = (steering.at(times[0]), self.speed_at(times[0]))
+            else {
                 continue;
             };
             if step_s > gyro.max_gap_s() || speed.abs() > most_mps {
                 continue;
             }
             n += step_s;
-            (s, g) = (s + said * step_s, g + rate * step_s);
-            (ss, sg) = (ss + said * said * step_s, sg + said * rate * step_s);
-            if said.abs() > TURNING_RADPS {
+            (s, g) = (s + steered * step_s, g + rate * step_s);
+            (ss, sg) = (
+                ss + steered * steered * step_s,
+                sg + steered * rate * step_s,
+            );
+            if steered.abs() > TURNING_RADPS {
                 turning_s += step_s;
             }
         }

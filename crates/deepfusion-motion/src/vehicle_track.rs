@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn an_accelerating_car_goes_half_a_t_squared() {
-        // v = 3 t sampled unevenly: for which the trapezoidal rule is exact.
+        // v = 3 t, sampled unevenly: the trapezoidal rule is exact for it.
         let samples: Vec<_> = [0.0, 0.1, 0.25, 0.3, 0.5]
             .iter()
             .map(|t| (*t, 3.0 * t, -0.2))

@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn expected_settings_as_text() {
-        for (expected, said) in [
+        for (expected, text) in [
             (Expected::AboveZero, "a number above 0"),
             (Expected::NotNegative, "a number of at least 0"),
             (Expected::Below(80.0), "less than 80"),
@@ -239,7 +239,7 @@ mod tests {
             ),
             (Expected::LowerFirst, "the lower height first"),
         ] {
-            assert_eq!(expected.to_string(), said);
+            assert_eq!(expected.to_string(), text);
         }
         let steep = PerceptionConfig {
             max_tilt_deg: 90.0,

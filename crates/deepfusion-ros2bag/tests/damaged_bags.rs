@@ -198,8 +198,8 @@ fn unsupported_files_have_a_hint() {
         panic!("{damage}");
     };
     assert_eq!(files, &[FileDamage::NotThere(bag.join("bag_1.db3"))]);
-    let said = damage.to_string();
-    assert!(said.ends_with("bag_1.db3 does not exist"), "{said}");
+    let message = damage.to_string();
+    assert!(message.ends_with("bag_1.db3 does not exist"), "{message}");
     std::fs::write(
         bag.join("metadata.yaml"),
         "rosbag2_bagfile_information: 3\n",

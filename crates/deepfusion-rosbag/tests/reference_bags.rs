@@ -67,7 +67,7 @@ fn each_compression(check: impl Fn(&Bag, &EveryType)) {
 }
 
 fn connections(bag: &Bag) -> Vec<Connection> {
-    let said = |c: &deepfusion_rosbag::Connection| Connection {
+    let described = |c: &deepfusion_rosbag::Connection| Connection {
         topic: c.topic.clone(),
         r#type: c.type_name.clone(),
         md5: c.md5.clone(),
@@ -75,7 +75,7 @@ fn connections(bag: &Bag) -> Vec<Connection> {
         caller_id: c.caller_id.clone(),
         latching: c.latching,
     };
-    bag.connections().iter().map(said).collect()
+    bag.connections().iter().map(described).collect()
 }
 
 fn nanos(bag: &Bag) -> (u64, u64) {

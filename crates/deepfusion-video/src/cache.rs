@@ -154,6 +154,7 @@ pub(crate) fn frame_path(cache: &Path, index: u64) -> PathBuf {
 
 /// Calls `make` to decode the frames into a temporary folder, which is renamed when it is complete. Does nothing if the cache
 /// has them already.
+///
 /// # Errors
 /// Those of `make`; [`Error::File`].
 pub(crate) fn keep<E: From<Error>>(

@@ -17,7 +17,7 @@ pub(crate) struct Decoded(Mutex<Option<Result<(), Refusal>>>);
 /// Why frames could not be decoded: the message of the first error.
 #[derive(Debug, Clone)]
 struct Refusal {
-    said: String,
+    message: String,
     hint: Option<String>,
     when: Instant,
     /// Number of attempts.
@@ -55,18 +55,18 @@ impl Decoded {
 
 impl Refusal {
     fn of(error: &impl Hint, tries: u32) -> Self {
-        let mut said = error.to_string();
+        let mut message = error.to_string();
         let mut cause = error.source();
         while let Some(error) = cause {
             let text = error.to_string();
             // Many messages already contain their cause's message.
-            if !said.contains(&text) {
-                said += &format!(": {text}");
+            if !message.contains(&text) {
+                message += &format!(": {text}");
             }
             cause = error.source();
         }
         Self {
-            said,
+            message,
             hint: error.hint(),
             when: Instant::now(),
             tries,
@@ -78,8 +78,8 @@ impl Refusal {
     }
 
     fn again(&self) -> Error {
-        let Self { said, hint, .. } = self.clone();
-        Error::NotDecoded { said, hint }
+        let Self { message, hint, .. } = self.clone();
+        Error::NotDecoded { message, hint }
     }
 }
 

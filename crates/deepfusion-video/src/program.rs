@@ -51,7 +51,7 @@ impl Printed {
             program,
             problem: ProgramProblem::Failed {
                 task,
-                said: self.complaint,
+                message: self.complaint,
             },
         })
     }
@@ -98,9 +98,9 @@ pub(crate) fn outcome<S: AsRef<OsStr>>(
         child.wait_with_output()
     })
     .map_err(failed)?;
-    let said = String::from_utf8_lossy(&output.stderr);
+    let message = String::from_utf8_lossy(&output.stderr);
     Ok(Printed {
-        complaint: said.trim().chars().take(LONGEST).collect(),
+        complaint: message.trim().chars().take(LONGEST).collect(),
         text: output.stdout,
         succeeded: output.status.success(),
     })

@@ -133,7 +133,7 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
             path: video.to_owned(),
             program: "ffmpeg",
             problem: ProgramProblem::StoppedEarly {
-                said: done.complaint,
+                message: done.complaint,
             },
         })
     }

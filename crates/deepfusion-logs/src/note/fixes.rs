@@ -61,7 +61,7 @@ mod tests {
             sigma_mps: 0.123,
         };
         let fix_rows = |of_satellites| FixesNote::FixRows { of_satellites };
-        for (note, said) in [
+        for (note, text) in [
             (
                 speeds(true),
                 "speeds as the receiver measured them, with a median standard deviation of 0.12 m/s",
@@ -87,7 +87,7 @@ mod tests {
                 "speeds of the Fix rows of any provider: none is from GPS alone",
             ),
         ] {
-            assert_eq!(note.to_string(), said);
+            assert_eq!(note.to_string(), text);
         }
     }
 }

@@ -282,9 +282,9 @@ mod tests {
     fn passwords_are_not_shown() {
         let address = Address::parse("rtsp://me:p@ss@cam.local:554/live").unwrap();
         assert_eq!(address.to_string(), "rtsp://***@cam.local:554/live");
-        let said =
+        let shown =
             address.without_password("rtsp://me:p@ss@cam.local:554/live: Connection refused");
-        assert_eq!(said, "rtsp://***@cam.local:554/live: Connection refused");
+        assert_eq!(shown, "rtsp://***@cam.local:554/live: Connection refused");
         assert_eq!(
             input("rtsp://me:p@ss@cam.local:554/live", "linux"),
             "-rtsp_transport tcp -i rtsp://me:p@ss@cam.local:554/live"

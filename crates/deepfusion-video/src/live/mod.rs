@@ -105,7 +105,7 @@ impl LiveSource {
             kind: self.address.kind(),
             frames: came,
             code: end.code,
-            said: self.without_password(&end.said),
+            lines: self.without_password(&end.lines),
         }))
     }
 
@@ -115,13 +115,13 @@ impl LiveSource {
             address: self.address.to_string(),
             waited: self.timeout,
             frames: self.ffmpeg.slot().arrived(),
-            said: self.without_password(&self.ffmpeg.said()),
+            lines: self.without_password(&self.ffmpeg.last_lines()),
         }
     }
 
-    fn without_password(&self, said: &[String]) -> Vec<String> {
-        let lines = said.iter();
+    fn without_password(&self, lines: &[String]) -> Vec<String> {
         lines
+            .iter()
             .map(|line| self.address.without_password(line))
             .collect()
     }

@@ -136,8 +136,8 @@ impl<'a> Batch<'a> {
         if printed.succeeded && printed.complaint.is_empty() && numbers.clone().all(|i| there(&i)) {
             return Ok(None);
         }
-        let said = &printed.complaint;
-        if let Some(own) = said
+        let message = &printed.complaint;
+        if let Some(own) = message
             .lines()
             .find(|line| OWN_PROBLEMS.iter().any(|p| line.contains(p)))
         {
@@ -145,21 +145,21 @@ impl<'a> Batch<'a> {
                 path: of.to_owned(),
                 program: "ffmpeg",
                 problem: ProgramProblem::Unable {
-                    said: own.trim().to_owned(),
+                    message: own.trim().to_owned(),
                 },
             });
         }
-        if said.contains("monoton") || said.contains("Invalid pts") {
+        if message.contains("monoton") || message.contains("Invalid pts") {
             return Ok(Some(PacketProblem::Reordered));
         }
         // The first line, without the name and address of the part of ffmpeg that printed it.
-        let line = said.lines().next().unwrap_or_default();
+        let line = message.lines().next().unwrap_or_default();
         let line = line.rsplit_once("] ").map_or(line, |(_, line)| line);
         Ok(Some(if line.is_empty() {
             PacketProblem::NoPicture
         } else {
-            let said = line.to_owned();
-            PacketProblem::Damaged { said }
+            let message = line.to_owned();
+            PacketProblem::Damaged { message }
         }))
     }
 }
@@ -176,8 +176,8 @@ pub(super) fn picture(
     let file = [&head(codec)[..], &packet_head(packet, 0), packet].concat();
     let printed = ffmpeg(codec, &Source::Bytes(&file), (of, Path::new(".")))?;
     Ok(if printed.text.is_empty() {
-        let said = printed.complaint;
-        Err(PacketProblem::NoFirstPicture { said })
+        let message = printed.complaint;
+        Err(PacketProblem::NoFirstPicture { message })
     } else {
         Ok(printed.text)
     })
