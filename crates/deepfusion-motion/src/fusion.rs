@@ -151,7 +151,7 @@ impl FusedTrack {
             let known = !imu.standstills().is_empty() || config.imu.gyro_bias_radps.is_some();
             let usual_bias = if known { KNOWN_BIAS } else { UNKNOWN_BIAS };
             let found = yaw_errors(imu.yaw_rate(), steering, speed, bicycle, usual_bias);
-            freed = Some(freed_of(&found, imu.yaw_rate(), steering, speed));
+            freed = Some(without_errors(&found, imu.yaw_rate(), steering, speed));
         }
         Ok(Self {
             speed_mps: speed.clone(),
@@ -295,7 +295,7 @@ impl FusedTrack {
 }
 
 /// The yaw rates of gyro and steering without the errors found in them.
-fn freed_of(
+fn without_errors(
     found: &[DrivingBias],
     gyro: &Signal,
     steering: &Signal,

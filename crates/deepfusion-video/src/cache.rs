@@ -102,7 +102,7 @@ impl Origin {
     }
 }
 
-/// Where the frames of a video, or of a stream in a recording, are kept in `folder`: as `<name>.frames` if it is the folder of `file`,
+/// Where the frames of a video, or of a stream in a recording, are kept in `folder`: as `<name>.frames` if `file` is in it,
 /// else as `<name>-<hash>.frames`, with a hash of the file's path, as recordings with the same name may share a folder.
 #[must_use]
 pub fn frames_folder(folder: &Path, file: &Path, name: &str) -> PathBuf {

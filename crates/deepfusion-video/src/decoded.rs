@@ -38,7 +38,7 @@ impl Decoded {
         let mut outcome = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let tries = match &*outcome {
             Some(Ok(())) => return Ok(()),
-            Some(Err(refusal)) if !refusal.is_to_be_tried(PAUSE) => {
+            Some(Err(refusal)) if !refusal.may_be_retried(PAUSE) => {
                 return Err(refusal.again().into());
             }
             Some(Err(refusal)) => refusal.tries,
@@ -73,7 +73,7 @@ impl Refusal {
         }
     }
 
-    fn is_to_be_tried(&self, pause: Duration) -> bool {
+    fn may_be_retried(&self, pause: Duration) -> bool {
         self.tries < TRIES && self.when.elapsed() >= pause
     }
 
@@ -108,9 +108,9 @@ mod tests {
     fn a_failure_is_retried_a_few_times_later() {
         let full = Error::file(Path::new("cache"), ErrorKind::StorageFull.into());
         let refusal = Refusal::of(&full, 1);
-        assert!(!refusal.is_to_be_tried(PAUSE));
-        assert!(refusal.is_to_be_tried(Duration::ZERO));
-        assert!(!Refusal::of(&full, TRIES).is_to_be_tried(Duration::ZERO));
+        assert!(!refusal.may_be_retried(PAUSE));
+        assert!(refusal.may_be_retried(Duration::ZERO));
+        assert!(!Refusal::of(&full, TRIES).may_be_retried(Duration::ZERO));
     }
 
     #[test]

@@ -110,7 +110,7 @@ pub(crate) fn outcome<S: AsRef<OsStr>>(
 ///
 /// # Errors
 /// Those of `run`.
-pub(crate) fn in_either_words(run: impl Fn(&str) -> Result<Printed>) -> Result<Printed> {
+pub(crate) fn with_either_option_name(run: impl Fn(&str) -> Result<Printed>) -> Result<Printed> {
     let printed = run("-fps_mode")?;
     if printed.does_not_know("fps_mode") {
         run("-vsync")

@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn in_a_row_things_are_turned_square_to_the_lane() {
+    fn boxes_in_a_row_are_turned_square_to_the_lane() {
         let scene = Scene::of(&[]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));

@@ -37,7 +37,7 @@ const SURE: f32 = 2.0;
 /// How far a row is searched before its first car, and beyond its last car or the last one across the lane, in metres.
 const BEFORE_M: f32 = 10.0;
 /// See [`BEFORE_M`].
-const GOES_ON_M: f32 = 15.0;
+const CONTINUES_M: f32 = 15.0;
 /// Weight of a vehicle driving along the lane for the lane's curvature, in sightings of a car, at any distance.
 const DRIVEN: f32 = 2.0;
 /// Smallest distance between two rows, in metres.
@@ -221,7 +221,7 @@ impl Row {
     pub(super) fn end(&self) -> f32 {
         let all = self.cars.iter().chain(&self.across);
         let last = all.map(|car| car.middle[1]);
-        last.fold(f32::NEG_INFINITY, f32::max) + GOES_ON_M
+        last.fold(f32::NEG_INFINITY, f32::max) + CONTINUES_M
     }
 
     /// Whether this forward position is within the search range.

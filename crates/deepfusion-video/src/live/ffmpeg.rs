@@ -188,7 +188,7 @@ impl FfmpegExit {
     }
 
     /// Whether it is too old for `-fps_mode`.
-    pub(super) fn knows_no_option(&self) -> bool {
+    pub(super) fn is_too_old(&self) -> bool {
         self.printed_one_of(&["'fps_mode'"])
     }
 
@@ -222,7 +222,7 @@ mod tests {
             )
             .is_clean()
         );
-        assert!(end(1, &["Unrecognized option 'fps_mode'."]).knows_no_option());
+        assert!(end(1, &["Unrecognized option 'fps_mode'."]).is_too_old());
     }
 
     #[test]

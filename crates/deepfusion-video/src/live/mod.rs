@@ -89,7 +89,7 @@ impl LiveSource {
     fn ended(&mut self, problem: Option<Arc<LiveFrameProblem>>) -> Result<NextFrame> {
         let end = self.ffmpeg.end();
         let came = self.ffmpeg.slot().arrived();
-        if came == 0 && !self.old_names && end.knows_no_option() {
+        if came == 0 && !self.old_names && end.is_too_old() {
             // ffmpeg checks its arguments before it opens anything, so the source was not opened.
             self.old_names = true;
             self.ffmpeg = Ffmpeg::start(&self.address, true)?;

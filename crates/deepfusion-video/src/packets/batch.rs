@@ -4,7 +4,7 @@
 //! that time, so a picture that it does not write is noticed by its missing name.
 
 use super::Codec;
-use crate::program::{Printed, in_either_words, outcome};
+use crate::program::{Printed, outcome, with_either_option_name};
 use crate::{Error, PacketProblem, ProgramProblem, ProgramTask, Result};
 use std::ffi::OsStr;
 use std::fs::File;
@@ -196,7 +196,7 @@ fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Re
         Source::File(name) => (*name, None),
         Source::Bytes(bytes) => ("pipe:0", Some(*bytes)),
     };
-    in_either_words(|mode| {
+    with_either_option_name(|mode| {
         // Times stay as they are. A packet with an error gives no picture, rather than half of one.
         let mut arguments = vec!["-v", "error", "-y", "-copyts", "-err_detect", "explode"];
         if let Some(decoder) = codec.decoder() {
@@ -240,8 +240,8 @@ fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Re
     })
 }
 
-/// The file's header. The size is also in the packets, where it counts; so does the number of packets. The rate is 25 per second:
-/// [`RATE`].
+/// The file's header. The frames' size and the number of packets in it are not used, since the packets determine both. The rate is 25 per
+/// second: [`RATE`].
 fn head(codec: Codec) -> [u8; HEAD as usize] {
     let mut head = [0; HEAD as usize];
     head[..4].copy_from_slice(b"DKIF");
