@@ -76,7 +76,7 @@ def test_arrays_are_made_once(drive):
         assert getattr(seen, name) is getattr(seen, name), name
 
 
-def test_how_far_to_trust_a_pixel(drive, model):
+def test_the_confidence_of_a_pixel(drive, model):
     """exp(-expected error), computed from the standard deviation."""
     frame = deepfusion.Dataset(drive)[0]
     seen = deepfusion.load("street").predict(frame.image, frame.intrinsics)
@@ -87,7 +87,7 @@ def test_how_far_to_trust_a_pixel(drive, model):
     assert model.predict(frame.image, frame.intrinsics).confidence is None
 
 
-def test_how_sure_it_is_is_the_commands(drive, tmp_path):
+def test_sigma_is_the_commands(drive, tmp_path):
     """`street` has factors that scale its predicted sigma."""
     command = os.environ.get("DEEPFUSION") or str(Path(sysconfig.get_path("scripts")) / "deepfusion")
     frame = deepfusion.Dataset(drive)[0]
@@ -250,7 +250,7 @@ def test_a_frame_is_an_image(drive, model):
     assert other.intrinsics == (100, 100, 160, 48) and not np.array_equal(other.depth, expected.depth)
 
 
-def test_the_view_is_a_camera(drive, model):
+def test_a_field_of_view_is_a_camera(drive, model):
     frame = deepfusion.Dataset(drive)[0]
     width = frame.image.shape[1]
     fx, fy, cx, cy = model.predict(frame.image, hfov_deg=90).intrinsics
@@ -417,7 +417,7 @@ def test_doubts_about_a_recording_are_warnings(drive, tmp_path):
             deepfusion.Dataset(folder)
 
 
-def test_the_metrics_are_the_fields():
+def test_the_metrics_are_the_usual_ones():
     rng = np.random.default_rng(3)
     truth = rng.uniform(1, 70, (20, 30))
     truth[rng.random(truth.shape) < 0.5] = 0

@@ -262,7 +262,7 @@ def test_ctrl_c_ends_other_long_calls(street, tmp_path):
 
 @pytest.mark.skipif(os.name != "posix", reason="makes a pipe, sends SIGINT")
 @pytest.mark.parametrize("call", ["Dataset", "load"])
-def test_ctrl_c_ends_what_reads_for_long(run, street, tmp_path, call):
+def test_ctrl_c_ends_long_reading(run, street, tmp_path, call):
     """A file that never arrives simulates a large recording, or weights on a slow disk."""
     if call == "Dataset":
         date = tmp_path / street.parent.name

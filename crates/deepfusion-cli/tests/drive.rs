@@ -206,7 +206,7 @@ fn a_varied_street_that_blocks_cars_gives_a_warning() {
 
 /// Velocities are exported beside depths and never mistaken for them.
 #[test]
-fn a_bag_s_velocities_are_exported_beside_its_depths() {
+fn a_bags_velocities_are_exported_beside_its_depths() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(

@@ -445,7 +445,7 @@ fn options_replace_their_own_part_of_a_file() {
 }
 
 #[test]
-fn what_cannot_be_trained_on_is_an_error() {
+fn unusable_data_or_settings_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fails(at, "train --data nowhere", &["nowhere"]);
@@ -579,7 +579,7 @@ fn weights_trained_with_other_conventions_give_a_warning() {
 }
 
 #[test]
-fn weights_and_bench_say_what_they_do() {
+fn weights_are_listed_and_a_network_is_timed() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     assert!(ok(at, "weights list").stdout.contains("Monodepth2"));
@@ -608,7 +608,7 @@ fn weights_and_bench_say_what_they_do() {
 
 /// Two cameras are trained with each other's views, without speeds; one camera is refused.
 #[test]
-fn both_cameras_are_each_others_view() {
+fn each_of_two_cameras_is_a_view_of_the_other() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let street = "simulate --frames 8 --seed 3 --scan-every 0 --size 192x64";

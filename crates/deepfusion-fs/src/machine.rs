@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_is_known_by_its_start_or_its_name() {
+    fn a_machine_is_identified_by_its_start_or_its_name() {
         let this = machine("a", "1");
         for (other, expected) in [
             (machine("a", "1"), true),
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_is_what_its_text_says() {
+    fn a_machine_is_read_back_from_its_text() {
         for machine in [Machine::this(), machine("a", "1"), machine("", "")] {
             let text = machine.to_text();
             assert_eq!(Machine::from_text(&text), Some(machine));

@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reason_that_says_what_to_do_has_its_own_hint() {
+    fn known_kinds_of_errors_have_their_own_hints() {
         for (kind, said) in [
             (ErrorKind::NotFound, "spelling"),
             (ErrorKind::PermissionDenied, "permissions"),

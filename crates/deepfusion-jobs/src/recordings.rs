@@ -395,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn a_topic_that_is_none_is_named() {
+    fn an_invalid_topic_is_named() {
         let error = named_topics(&["/camera".to_owned()]).unwrap_err();
         assert_eq!(
             error.to_string(),
@@ -453,7 +453,7 @@ mod tests {
 
     /// If each were turned by itself, the errors would make two cameras diverge, and they would no longer be a stereo pair.
     #[test]
-    fn two_cameras_of_a_drive_are_aimed_as_one() -> std::result::Result<(), Box<dyn Error>> {
+    fn two_cameras_of_a_drive_are_aimed_together() -> std::result::Result<(), Box<dyn Error>> {
         let at = tempfile::tempdir()?;
         let simulation = Simulation::new(&SimConfig {
             stereo_baseline_m: 0.5,
@@ -493,7 +493,7 @@ mod tests {
     /// For a drive with only a speed, the images show its turns and its camera's heading; with `measured_turns_only`, nothing is taken from
     /// them.
     #[test]
-    fn a_speed_is_enough() -> std::result::Result<(), Box<dyn Error>> {
+    fn turns_and_heading_are_found_with_only_a_speed() -> std::result::Result<(), Box<dyn Error>> {
         let at = tempfile::tempdir()?;
         let folder = folder(at.path())?;
         let speeds = fs::read_to_string(folder.join("speed.csv"))?;

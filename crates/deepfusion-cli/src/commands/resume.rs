@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_of_a_recording_that_is_gone_names_its_option() {
+    fn the_error_of_a_missing_recording_names_its_option() {
         let mut config = a_run();
         config.data.validation = vec!["/data/val".into()];
         let explained = |path: &str| {

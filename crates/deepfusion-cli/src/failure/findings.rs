@@ -86,7 +86,7 @@ mod tests {
     use deepfusion_logs::{ColumnProblem, NoGps, SignalProblem};
 
     #[test]
-    fn every_hint_that_an_option_does_names_it() {
+    fn hints_name_the_options_to_use() {
         let unreadable = |error: Error| LogReason::Unreadable(SharedError::from(error));
         let of_log = [
             LogReason::NoSpeed(NoGps::NoFix),

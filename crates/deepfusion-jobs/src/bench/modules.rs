@@ -97,7 +97,7 @@ mod tests {
     use deepfusion_model::Preset;
 
     #[test]
-    fn the_papers_parts_are_all_there_and_add_up() {
+    fn the_papers_parts_are_complete_and_add_up() {
         let modules = ModuleCosts::new(&Preset::Paper.config());
         let table = modules.to_string();
         for part in [

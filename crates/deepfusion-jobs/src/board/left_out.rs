@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reason_is_written_in_words() {
+    fn reasons_are_serialised_as_text() {
         let (columns, rows) = (11, 6);
         for (why, said) in [
             (LeftOutReason::NoBoard, "no board"),

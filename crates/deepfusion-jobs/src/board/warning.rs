@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_warning_is_said_in_words() {
+    fn warnings_have_the_expected_text() {
         let few = CalibrationWarning::FewViews {
             used: 6,
             enough: 10,
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn only_squares_that_nobody_prints_are_warned_of() {
+    fn only_implausibly_large_squares_give_a_warning() {
         let warned = |side: Option<f64>| {
             let board = Board::new(9, 6, side).unwrap();
             BoardWarning::of_squares(&board).is_some()

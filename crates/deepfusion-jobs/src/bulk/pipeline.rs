@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_computed_before_the_stop_is_finished() {
+    fn items_computed_before_the_stop_are_finished() {
         let (computed, finished) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let stop = || computed.load(Ordering::SeqCst) >= 5;
         run(

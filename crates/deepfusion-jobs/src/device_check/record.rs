@@ -62,7 +62,7 @@ mod tests {
     use deepfusion_train::device_check::{NeededBy, OperationCheck, OperationFailure};
 
     #[test]
-    fn what_is_infinite_is_null() {
+    fn infinite_errors_are_null() {
         let failed = OperationCheck {
             operation: "any",
             needed_by: NeededBy::Flow,

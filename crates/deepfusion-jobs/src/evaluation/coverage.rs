@@ -169,7 +169,7 @@ mod tests {
 
     /// If a split lists both cameras and only one is opened, the message says so instead of reporting missing data.
     #[test]
-    fn frames_of_the_other_camera_are_said_to_be_its() {
+    fn frames_of_the_other_camera_are_reported_as_such() {
         let at = tempfile::tempdir().unwrap();
         let simulation = Simulation::new(&SimConfig {
             frames: 4,

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_are_found_once_and_anew_for_anything_else() {
+    fn turns_are_measured_again_only_after_a_change() {
         let at = tempfile::tempdir().unwrap();
         let root = drive(at.path());
         let dataset = opened(&root);

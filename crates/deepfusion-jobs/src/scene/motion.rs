@@ -166,7 +166,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn a_camera_that_looks_back_has_nothing_ahead() {
+    fn a_camera_that_looks_back_has_no_yaw() {
         let looking = |x: f64, z: f64| Motion {
             ahead_in_cam: Some(Vector3::new(x, 0.0, z)),
             ..Motion::default()
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_given_speed_is_a_way_straight_ahead() {
+    fn a_given_speed_is_motion_straight_ahead() {
         let mut way = StraightWay::new(Some(8.0));
         let start = Instant::now();
         assert!(!way.at(start).goes_on);

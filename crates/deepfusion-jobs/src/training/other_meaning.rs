@@ -114,7 +114,7 @@ mod tests {
     use deepfusion_model::Preset;
 
     #[test]
-    fn what_differs_is_said_where_depth_has_learned() {
+    fn differences_are_reported_if_depth_was_trained() {
         let theirs = Preset::RMsfm3.config();
         assert!(OtherMeaning::all(&theirs, &theirs, true).is_empty());
         let mut own = theirs.clone();

@@ -426,7 +426,7 @@ mod tests {
     /// Which presets could start from which: `light` has the embedded network's layers; Monodepth2's has the same tensors, but other
     /// depths.
     #[test]
-    fn layers_and_range_decide() {
+    fn layers_and_range_decide_which_presets_match() {
         let net = |preset: Preset| preset.config().depth_net;
         for a in Preset::ALL {
             for b in Preset::ALL {
@@ -448,7 +448,7 @@ mod tests {
     }
 
     #[test]
-    fn the_settings_of_a_mean_are_told_from_those_of_a_run() {
+    fn settings_of_a_mean_are_distinguished_from_those_of_a_run() {
         let folder = tempfile::tempdir().unwrap();
         let run = RunFolder::create(folder.path()).unwrap();
         let part = |path: &str| AveragedNetwork {
@@ -475,7 +475,7 @@ mod tests {
     /// The folder of a mean is known while its configuration is beside its weights; a start that the first network did not have was chosen
     /// by the user.
     #[test]
-    fn settings_of_a_mean_say_where_it_is_unless_somebody_chose_a_beginning() {
+    fn settings_of_a_mean_name_its_folder_unless_a_start_was_chosen() {
         let at = tempfile::tempdir().unwrap();
         let at = at.path();
         let first = RunFolder::create(&at.join("first")).unwrap();
@@ -513,7 +513,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_neither_there_nor_embedded_is_an_error_that_names_both() {
+    fn an_unknown_network_is_an_error_that_lists_the_embedded_ones() {
         let error = Start::named(Path::new("no-such-network")).unwrap_err();
         assert!(error.to_string().contains("no-such-network"), "{error}");
         let hint = error.hint().unwrap();
@@ -529,7 +529,7 @@ mod tests {
 
     /// Repeating a run reports that the network it started from is not embedded, or is another one.
     #[test]
-    fn other_weights_than_a_run_began_from_are_refused() {
+    fn weights_other_than_a_run_started_from_are_refused() {
         let mut config = Preset::Light.config();
         let start = Start::of(None, &config, false).unwrap();
         assert!(matches!(start, Start::Nothing));
