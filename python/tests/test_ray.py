@@ -637,6 +637,6 @@ def test_trials_share_the_arguments_of_training(street):
     """And each is given its device."""
     learning = _tune._learning("none", [street], "3", 0, None)
     assert learning == {"init": "none", "validation": [str(street)], "camera": "3", "device": "cpu"}
-    for gpus, device, said in [(-1, None, "gpus_per_trial"), (0, "auto", "needs gpus_per_trial"), (1, "cpu", "idle")]:
-        with pytest.raises(ValueError, match=said):
+    for gpus, device, expected in [(-1, None, "gpus_per_trial"), (0, "auto", "needs gpus_per_trial"), (1, "cpu", "idle")]:
+        with pytest.raises(ValueError, match=expected):
             _tune._learning(None, None, None, gpus, device)

@@ -182,7 +182,7 @@ def test_wrong_configurations_say_what_is_wrong(run, street, tmp_path):
     assert "light" in wrong("lihgt", street)
     assert "batsch" in wrong({"batsch": 3}, street)
     assert "many" in wrong({"batch": "many"}, street)
-    assert "nothing to learn" in wrong("tiny")
+    assert "no recordings to train on" in wrong("tiny")
     assert "nowhere" in wrong("tiny", tmp_path / "nowhere")
     assert "no-such-network" in wrong(SMALL, street, init="no-such-network")
     assert "not empty" in wrong(SMALL, street, out=run[0].path)

@@ -385,8 +385,8 @@ fn frames_before_the_first_key_frame_are_left_out_with_a_warning() {
     let opened = open(&bag).unwrap();
     let warnings: Vec<String> = opened.warnings().iter().map(ToString::to_string).collect();
     let warnings = warnings.join("\n");
-    let said = format!("/camera/image_rect/ffmpeg: the first {} messages", KEYS - 3);
-    assert!(warnings.contains(&said), "{warnings}");
+    let expected = format!("/camera/image_rect/ffmpeg: the first {} messages", KEYS - 3);
+    assert!(warnings.contains(&expected), "{warnings}");
 
     // Without any key frame there are no images.
     let mut none = some(&packets);
@@ -521,9 +521,9 @@ fn a_missing_ffmpeg_is_an_error_with_a_hint() {
         .env("PATH", &nowhere)
         .output()
         .unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let printed = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{printed}");
     for part in ["ffmpeg is needed to read videos", "hint: install ffmpeg"] {
-        assert!(said.contains(part), "{said}");
+        assert!(printed.contains(part), "{printed}");
     }
 }

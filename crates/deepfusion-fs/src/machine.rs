@@ -12,18 +12,18 @@ pub(crate) struct Machine {
 impl Machine {
     /// The machine that this process runs on.
     pub(crate) fn this() -> Self {
-        let said = |path: &str| {
+        let content = |path: &str| {
             let text = fs::read_to_string(path).unwrap_or_default();
             text.trim().to_owned()
         };
-        let mut name = said("/proc/sys/kernel/hostname");
+        let mut name = content("/proc/sys/kernel/hostname");
         if name.is_empty() {
             // Windows has the name there.
             name = std::env::var("COMPUTERNAME").unwrap_or_default();
         }
         Self {
             name,
-            boot: said("/proc/sys/kernel/random/boot_id"),
+            boot: content("/proc/sys/kernel/random/boot_id"),
         }
     }
 

@@ -368,8 +368,8 @@ mod tests {
         let (aside, kept) = old();
         let error = kept.put_back(refused());
         assert_eq!(error.kind(), ErrorKind::PermissionDenied);
-        let said = error.to_string();
-        assert!(said.contains(aside.to_str().unwrap()), "{said}");
+        let message = error.to_string();
+        assert!(message.contains(aside.to_str().unwrap()), "{message}");
         PartialFolder::remove_leftovers(dir.path());
         assert_eq!(content(&aside), "old");
         assert_eq!(names(dir.path()).len(), 2, "{:?}", names(dir.path()));

@@ -33,7 +33,7 @@ mod tests {
 
     #[test]
     fn known_kinds_of_errors_have_their_own_hints() {
-        for (kind, said) in [
+        for (kind, expected) in [
             (ErrorKind::NotFound, "spelling"),
             (ErrorKind::PermissionDenied, "permissions"),
             (ErrorKind::ReadOnlyFilesystem, "written to"),
@@ -42,7 +42,7 @@ mod tests {
             (ErrorKind::TimedOut, "check the disk"),
         ] {
             let hint = system_hint(kind);
-            assert!(hint.contains(said), "{kind}");
+            assert!(hint.contains(expected), "{kind}");
         }
     }
 }

@@ -410,7 +410,7 @@ mod tests {
         (ahead.x, ahead.y)
     }
 
-    fn said(drive: &Dataset) -> String {
+    fn warning_text(drive: &Dataset) -> String {
         let warnings = drive.warnings().iter();
         warnings
             .map(ToString::to_string)
@@ -424,7 +424,7 @@ mod tests {
         let folder = folder(at.path())?;
         let options = OpenOptions::default();
         let taken = &open_recordings(std::slice::from_ref(&folder), &options)?[0];
-        assert!(taken.mount_assumed() && said(taken).contains("straight"));
+        assert!(taken.mount_assumed() && warning_text(taken).contains("straight"));
         let straight = |(right, down): (f64, f64)| right.abs() < 1e-9 && down.abs() < 1e-9;
         assert!(straight(ahead(taken)));
 
@@ -437,10 +437,10 @@ mod tests {
         );
         assert!((down + off.sin()).abs() < 0.008 && right.abs() < 0.008);
         assert!(!aimed.mount_assumed());
-        let said = said(aimed);
+        let warning_text = warning_text(aimed);
         assert!(
-            said.contains("degrees down") && !said.contains("straight ahead"),
-            "{said}"
+            warning_text.contains("degrees down") && !warning_text.contains("straight ahead"),
+            "{warning_text}"
         );
 
         // A given mount is used as it is.
@@ -486,7 +486,7 @@ mod tests {
         let turned =
             taken[0].cam_from_vehicle().unwrap().inverse() * aimed[0].cam_from_vehicle().unwrap();
         assert!(turned.angle() > 1e-5, "nothing was found");
-        assert_eq!(said(&aimed[0]), said(&aimed[1]));
+        assert_eq!(warning_text(&aimed[0]), warning_text(&aimed[1]));
         Ok(())
     }
 

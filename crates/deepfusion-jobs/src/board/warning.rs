@@ -69,7 +69,7 @@ mod tests {
             enough: 10,
         };
         let (orientation, size) = (6, (480, 640));
-        for (warning, said) in [
+        for (warning, expected) in [
             (
                 BoardWarning::from(few),
                 "only 6 views: 10 to 30, from many sides, are better",
@@ -87,7 +87,7 @@ mod tests {
                 "images cannot be corrected with this lens: the distortion folds over within the image: it does not fit this camera matrix; show the board closer to the border of the image",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), expected);
         }
     }
 

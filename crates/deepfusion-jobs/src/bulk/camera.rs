@@ -257,12 +257,12 @@ impl LensFile {
             None => {
                 let calibration = CameraCalibration::read(&self.path, size)?;
                 let k = &calibration.intrinsics;
-                let said = (k.width, k.height);
+                let calibrated = (k.width, k.height);
                 // A lens takes memory for each pixel, so none is made for a size that no image has.
-                if said != size {
-                    return Err(other_size(said));
+                if calibrated != size {
+                    return Err(other_size(calibrated));
                 }
-                let made = (said, calibration.lens()?);
+                let made = (calibrated, calibration.lens()?);
                 // If another thread was first, it made the same lens.
                 self.lens.get_or_init(|| made)
             }

@@ -217,7 +217,10 @@ fn an_image_whose_name_is_not_utf_8_fails_alone() {
     let [(1, error @ Error::NotText { .. })] = summary.failures.as_slice() else {
         panic!("{:?}", summary.failures);
     };
-    assert!(error.hint().unwrap().contains("rename it"), "{error}");
+    assert!(
+        error.hint().unwrap().contains("rename the image"),
+        "{error}"
+    );
 }
 
 /// Frames of a folder of images whose camera has this focal length.

@@ -121,11 +121,11 @@ mod tests {
         own.depth_net.encoder.normalisation = InputNormalisation::Centred;
         own.depth_net.initial_depth_m = Some(33.0);
         own.depth_net.range.max_m = 60.0;
-        let said = |depth_learned| {
+        let warnings = |depth_learned| {
             let all = OtherMeaning::all(&theirs, &own, depth_learned);
             all.iter().map(ToString::to_string).collect::<Vec<_>>()
         };
-        let all = said(true);
+        let all = warnings(true);
         let [images, initial, range] = all.as_slice() else {
             panic!("{all:?}")
         };
@@ -138,6 +138,6 @@ mod tests {
             "{initial}"
         );
         assert!(range.contains("to 60 m"), "{range}");
-        assert_eq!(said(false), std::slice::from_ref(images));
+        assert_eq!(warnings(false), std::slice::from_ref(images));
     }
 }

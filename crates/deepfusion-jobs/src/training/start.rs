@@ -465,9 +465,9 @@ mod tests {
         for (findings, of_mean) in [(mean, true), (TrainFindings::default(), false)] {
             run.write_config(&config, &findings).unwrap();
             let found = SettingsOfMean::of(&run.config_path(), &config).unwrap();
-            let said = found.map(|mean| mean.to_string()).unwrap_or_default();
+            let text = found.map(|mean| mean.to_string()).unwrap_or_default();
             for part in ["mean of 2 networks", "/first/best.safetensors"] {
-                assert_eq!(said.contains(part), of_mean, "{said}");
+                assert_eq!(text.contains(part), of_mean, "{text}");
             }
         }
     }
