@@ -87,7 +87,7 @@ pub(crate) enum CliError {
     )]
     #[error("{what} needs the training framework, which this build leaves out")]
     BuiltWithoutTraining {
-        /// What was asked for.
+        /// The command or option.
         what: &'static str,
     },
     /// An option that writes into a run's folder, for a network without one.
@@ -340,7 +340,7 @@ impl Reportable for CliError {
             Self::OnlyLive { .. } => {
                 Some("leave it out, or give camera:0, an address such as rtsp://…, or - for standard input".into())
             }
-            Self::Unwatched { .. } => Some("leave it out, or give recordings with speed and yaw rate alone".into()),
+            Self::Unwatched { .. } => Some("leave it out, or give only recordings with speed and yaw rate".into()),
             Self::CorrectShard => Some("leave out --shard, and give each run its own recordings".into()),
             Self::VideoShard => {
                 Some("save side-by-side in the shards, then run once more with --save video and without --shard".into())

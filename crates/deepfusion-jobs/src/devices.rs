@@ -61,7 +61,7 @@ impl Backend {
         }
     }
 
-    /// Whether this build has it: a GPU backend is a feature of the same name.
+    /// Whether this build has it: a GPU backend needs the feature of the same name.
     #[must_use]
     pub fn is_built(self) -> bool {
         match self {

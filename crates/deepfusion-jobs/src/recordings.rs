@@ -108,7 +108,7 @@ fn unaimed_rigs(datasets: &[Dataset], is_such: impl Fn(&Dataset) -> bool) -> Vec
     rigs
 }
 
-/// Aims the cameras of a rig by the images of the first one that show the heading.
+/// Aims the cameras of a rig by the first one whose images show the heading.
 fn aim(datasets: &mut [Dataset], rig: &[usize], heading: impl Fn(&Dataset) -> Option<Heading>) {
     let seen = rig.iter().find_map(|i| {
         let dataset = &datasets[*i];

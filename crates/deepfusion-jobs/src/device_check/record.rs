@@ -10,7 +10,7 @@ use crate::devices::ComputeDevice;
 pub struct DeviceCheckRecord {
     /// Name of the device.
     pub device: String,
-    /// Largest accepted error relative to the processor, over the largest value.
+    /// Largest accepted difference from the processor, relative to the largest value.
     pub tolerance: f64,
     /// Whether the ResNet presets predict the same depth as on the processor.
     pub predict: bool,

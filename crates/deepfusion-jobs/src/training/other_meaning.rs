@@ -25,7 +25,7 @@ pub enum OtherMeaning {
     },
     /// Depth is refined from another initial depth.
     #[error(
-        "the weights to start from refine an initial depth of {}, but it is {} in this configuration (depth_net.initial_depth_m): they have to learn this again",
+        "the weights to start from refine depth from {}, but this configuration refines it from {} (depth_net.initial_depth_m): they have to learn this again",
         initial(*was),
         initial(*is)
     )]
@@ -134,7 +134,7 @@ mod tests {
             "{images}"
         );
         assert!(
-            initial.contains("it is 33 m in this configuration"),
+            initial.contains("this configuration refines it from 33 m"),
             "{initial}"
         );
         assert!(range.contains("to 60 m"), "{range}");
