@@ -302,8 +302,8 @@ impl Reportable for CliError {
                 Some("give a name that ends in .bag for a ROS 1 bag, or another folder for KITTI raw".into())
             }
             Self::SomeFailed { hint, resumes, .. } => Some(match hint {
-                Some(hint) => format!("{hint}; then {}", again(*resumes)),
-                None => format!("fix them, then {}", again(*resumes)),
+                Some(hint) => format!("{hint}; then {}", how_to_continue(*resumes)),
+                None => format!("fix them, then {}", how_to_continue(*resumes)),
             }),
             Self::Unfit { .. } => Some("follow the hints above; --verbose prints every measurement".into()),
             Self::Unreadable { unreadable, recordings, hint, .. } => Some(format!(
@@ -314,7 +314,7 @@ impl Reportable for CliError {
             Self::OutputsAlone { .. } => Some("give the images that they were made from".into()),
             Self::TablesInPicture { .. } => Some("give --out another ending, such as .html or .txt".into()),
             Self::NotAFolder { .. } => Some("give --out a folder; it is created if it does not exist".into()),
-            Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),
+            Self::Interrupted { resumes, .. } => Some(how_to_continue(*resumes).to_owned()),
             Self::Stopped { go_on, .. } => Some(format!("continue with: {go_on}")),
             Self::Moved { option: Some(option), .. } => Some(format!(
                 "if it was moved, give its new path: {option} PATH; if its disk is not mounted, mount it"
@@ -403,7 +403,7 @@ fn counted(texts: &[String]) -> Vec<(&str, usize)> {
 }
 
 /// How to continue a bulk run.
-fn again(resumes: bool) -> &'static str {
+fn how_to_continue(resumes: bool) -> &'static str {
     if resumes {
         "run the same command again: finished images are kept"
     } else {

@@ -11,7 +11,7 @@ fn has_network() -> bool {
 }
 
 /// Asserts that the files of a demo exist and are not empty.
-fn are_there(demo: &Path, files: &[&str]) {
+fn assert_files_exist(demo: &Path, files: &[&str]) {
     for file in files {
         let length = fs::metadata(demo.join(file)).map_or(0, |file| file.len());
         assert!(length > 0, "{file}");
@@ -43,7 +43,7 @@ fn the_demo_shows_the_embedded_network_and_what_learning_adds() {
     let split = |name: &str| fs::read_to_string(at.join("first").join(name)).unwrap();
     assert_eq!(split("learned.txt").lines().count(), 7);
     assert_eq!(split("measured.txt").lines().count(), 4);
-    are_there(
+    assert_files_exist(
         &at.join("first"),
         &[
             "pictures/0000000009_side.png",
@@ -77,7 +77,7 @@ fn the_demo_from_scratch_ends_in_a_report() {
         "demo --from-scratch --out anew --frames 12 --steps 2 --size 192x64 --json",
     );
     assert_eq!(report["n"], 2, "every eighth of twelve frames: {report}");
-    are_there(
+    assert_files_exist(
         &at.join("anew"),
         &[
             "pictures/0000000001_side.png",

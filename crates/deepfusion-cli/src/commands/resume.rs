@@ -12,7 +12,7 @@ use crate::failure::{Failure, Result, option_of};
 
 /// A run's configuration, changed as the options ask.
 pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> {
-    Ok(resume::go_on_with(run, &request(args)?)?)
+    Ok(resume::resumed_config(run, &request(args)?)?)
 }
 
 fn request(args: &TrainArgs) -> Result<ResumeRequest> {

@@ -107,7 +107,7 @@ impl ScaleWatch {
         motion: &Motion,
         ground: Option<&Ground>,
     ) -> Option<ScaleRecord> {
-        if !motion.goes_on {
+        if !motion.continues {
             self.monitor.pause();
             self.last = None;
         }

@@ -82,7 +82,7 @@ pub enum ClockAhead {
 ///
 /// # Errors
 /// [`Error::Contradiction`]; an unknown term or key.
-pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainConfig> {
+pub fn resumed_config(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainConfig> {
     // Destructured, so that a new field cannot be forgotten here.
     let ResumeRequest {
         file,

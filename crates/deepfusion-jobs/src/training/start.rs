@@ -127,8 +127,8 @@ impl SettingsOfMean {
             return Ok(None);
         };
         let first_run = RunFolder::open(&first.path).and_then(|(run, _)| run.read_settings());
-        let is_chosen = config.init.is_some()
-            && first_run.is_ok_and(|run| beginning(&run) != beginning(config));
+        let is_chosen =
+            config.init.is_some() && first_run.is_ok_and(|run| start_of(&run) != start_of(config));
         Ok((!is_chosen).then(|| Self {
             first: first.path.clone(),
             networks: averaged.len(),
@@ -138,7 +138,7 @@ impl SettingsOfMean {
 }
 
 /// What a configuration starts from, independent of the folder that it was written in.
-fn beginning(config: &TrainConfig) -> (Option<PathBuf>, Option<String>) {
+fn start_of(config: &TrainConfig) -> (Option<PathBuf>, Option<String>) {
     let mut config = config.clone();
     config.make_absolute();
     (config.init, config.init_sha256)
