@@ -1,4 +1,4 @@
-//! The failures that only the command line knows.
+//! The errors that only the command line raises.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use deepfusion_sim::VariedConflict;
 
 use crate::failure::{Exit, Reportable};
 
-/// Failures that only the command line knows.
+/// Errors that only the command line raises.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CliError {
     /// Something that would be overwritten.

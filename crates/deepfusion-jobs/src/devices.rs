@@ -13,7 +13,7 @@ use serde::{Serialize, Serializer};
 use crate::Error;
 use crate::Result;
 
-/// What computes: this machine's processor, or a GPU through one of its interfaces.
+/// A backend: this machine's processor, or a GPU through one of its interfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backend {
     /// The processor.
