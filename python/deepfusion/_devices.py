@@ -20,11 +20,11 @@ def own_gpu(device: str, workers: Workers | None) -> str:
         device = "cuda" if fastest.partition(":")[0] == "cuda" else fastest
     if workers is None or device != "cuda":
         return device
-    said = next((os.environ[name] for name in _LOCAL_RANKS if os.environ.get(name, "").isdecimal()), None)
-    if said is None:
+    rank = next((os.environ[name] for name in _LOCAL_RANKS if os.environ.get(name, "").isdecimal()), None)
+    if rank is None:
         return device
     seen = os.environ.get("CUDA_VISIBLE_DEVICES")
-    index = int(said)
+    index = int(rank)
     # Some schedulers show each process only its own GPU.
     if seen:
         index %= len(seen.split(","))

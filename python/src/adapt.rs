@@ -118,7 +118,7 @@ pub(crate) fn adapt(
         warnings.others.append(&mut of_start);
         listener.warn(&warnings);
         listener.keep_log(&trainer)?;
-        let summary = trainer.run(&mut |event| listener.hear(event, stop))?;
+        let summary = trainer.run(&mut |event| listener.on_event(event, stop))?;
         drop(trainer);
         if summary.step < summary.steps {
             return Err(Failure {

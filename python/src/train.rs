@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use deepfusion::jobs::recordings::warnings_of;
 use deepfusion::jobs::samples::{SampleWarning, open_samples};
 use deepfusion::jobs::training::resume::{
-    MovedRecordings, ResumeRequest, go_on_with, require_no_fewer_steps,
+    MovedRecordings, ResumeRequest, require_no_fewer_steps, resumed_config,
 };
 use deepfusion::jobs::training::{RunLock, RunLog, Start, StartReport};
 use deepfusion::model::{CheckpointKind, Compute, Preset, RunFolder, TrainConfig};
@@ -118,7 +118,7 @@ pub(crate) fn train<'py>(
             workers.all_begun(begun.is_ok())?;
         }
         let (mut trainer, _lock) = begun?;
-        let listen = &mut |event| listener.hear(event, stop);
+        let listen = &mut |event| listener.on_event(event, stop);
         let summary = trainer.run(listen)?;
         Ok((summary, warnings.skipped))
     });
@@ -223,7 +223,7 @@ fn opened(
         let folder = RunFolder::open(&asked.out)?.0;
         let lock = lock_of(&folder, leads)?;
         let run = folder.read_settings()?;
-        let config = go_on_with(&run, &asked.to_resume(place.compute())?)?;
+        let config = resumed_config(&run, &asked.to_resume(place.compute())?)?;
         config.validate()?;
         // The run's errors are reported before the recordings are opened, which may take long.
         folder.require_checkpoint(CheckpointKind::Last)?;
@@ -427,10 +427,10 @@ impl Listener {
         }
     }
 
-    pub(crate) fn hear(&mut self, event: TrainEvent, stop: &Stop) -> Control {
+    pub(crate) fn on_event(&mut self, event: TrainEvent, stop: &Stop) -> Control {
         match self.handle(event) {
-            Ok(goes_on) => {
-                self.ends |= !goes_on;
+            Ok(continues) => {
+                self.ends |= !continues;
                 if self.ends || stop.asked() || self.raised.is_some() {
                     Control::Stop
                 } else {

@@ -79,7 +79,7 @@ def test_arrays_are_shared_and_not_copied(drive, model):
     assert np.array_equal(model.predict(Elsewhere(image), frame.intrinsics).depth, prediction.depth)
 
 
-def test_torch_shares_them(drive, model):
+def test_torch_shares_arrays(drive, model):
     torch = pytest.importorskip("torch")
     frame = deepfusion.Dataset(drive)[0]
     prediction = model.predict(torch.from_dlpack(frame.image), frame.intrinsics)

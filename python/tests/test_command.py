@@ -20,7 +20,7 @@ def ran(*words, command=(SCRIPT,), **options):
 
 
 @pytest.mark.parametrize("command", [(SCRIPT,), (sys.executable, "-m", "deepfusion")])
-def test_both_ways_are_the_command(command):
+def test_both_entry_points_run_the_command(command):
     version = ran("--version", command=command)
     assert version.returncode == 0 and version.stdout == f"deepfusion {deepfusion.__version__}\n"
     wrong = ran("pedict", command=command)
@@ -28,7 +28,7 @@ def test_both_ways_are_the_command(command):
     assert "Usage: deepfusion predict" in ran("predict", "--help", command=command).stdout
 
 
-def test_it_works_and_fails_as_the_program_does(tmp_path):
+def test_the_command_works_and_fails_as_the_program_does(tmp_path):
     out = tmp_path / "street"
     written = ran("simulate", "--out", out, "--frames", 3, "--size", "320x96", "--quiet")
     assert written.returncode == 0, written.stderr
@@ -61,7 +61,7 @@ program = os.environ.get("DEEPFUSION")
 
 
 @pytest.mark.skipif(not program, reason="no program given (DEEPFUSION)")
-def test_every_help_is_the_programs():
+def test_every_help_text_is_the_programs():
     for words in [[], ["predict"], ["train"], ["data"], ["weights", "list"], ["perceive"]]:
         theirs = ran(*words, "--help", command=(program,))
         ours = ran(*words, "--help")

@@ -35,7 +35,7 @@ def test_training_on_the_processor_by_name_is_the_same(street, tmp_path):
     assert runs[0].losses == runs[1].losses
 
 
-def test_a_backend_that_was_not_built_says_how_it_is(street, tmp_path):
+def test_a_backend_that_was_not_built_says_how_to_build_it(street, tmp_path):
     if not LACKING:
         pytest.skip("this package has every backend")
     name, out = LACKING[0], tmp_path / "run"
@@ -52,7 +52,7 @@ def test_a_backend_that_was_not_built_says_how_it_is(street, tmp_path):
 
 
 @pytest.mark.parametrize("word", ["gpu", "CUDA", "", "cuda:x", "cpu:0"])
-def test_words_that_are_no_device(word):
+def test_names_that_are_not_a_device(word):
     with pytest.raises(deepfusion.DeepFusionError, match="device") as caught:
         deepfusion.load("tiny", device=word)
     assert "cpu" in caught.value.hint or "cuda:1" in caught.value.hint

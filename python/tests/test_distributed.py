@@ -76,7 +76,7 @@ def mpiexec():
     return [found, "-n", "2", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none"]
 
 
-def test_two_processes_learn_what_one_learns_with_twice_the_batches(street, alone, tmp_path):
+def test_two_processes_train_as_one_with_twice_the_batches(street, alone, tmp_path):
     done, printed = launched(mpiexec(), street, tmp_path / "run", "mpi")
     assert done.returncode == 0, done.stderr
     assert [t["rank"] for t in printed] == [0, 1] and printed[0]["losses"] == printed[1]["losses"]
@@ -119,7 +119,7 @@ def test_a_worker_that_cannot_save_ends_the_others(street, alone, tmp_path):
     assert "last.safetensors" in done.stderr and "another" in done.stderr
 
 
-def test_torch_connects_them_too(street, alone, tmp_path):
+def test_torch_also_connects_workers(street, alone, tmp_path):
     """Started as torchrun does."""
     pytest.importorskip("torch")
     with socket.socket() as free:

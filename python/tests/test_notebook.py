@@ -13,7 +13,7 @@ pytest.importorskip("matplotlib")
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
-def test_it_runs_and_shows_its_pictures(tmp_path):
+def test_the_notebook_runs_and_shows_its_pictures(tmp_path):
     import nbformat
 
     out = tmp_path / "street.ipynb"

@@ -36,10 +36,10 @@ def test_a_varied_drive_has_a_camera_of_its_own(tmp_path):
     cameras = []
     for seed in (1, 2):
         drive = deepfusion.simulate(tmp_path / f"{seed}", frames=1, seed=seed, scene="country", varied=True, size=(96, 64), scan_every=0)
-        said = json.loads((drive / "varied.json").read_text())["camera"]
-        assert deepfusion.Dataset(drive)[0].intrinsics[0] == pytest.approx(said["intrinsics"]["fx"])
-        assert 0.3 <= said["height_m"] <= 2.5
-        cameras.append(said)
+        camera = json.loads((drive / "varied.json").read_text())["camera"]
+        assert deepfusion.Dataset(drive)[0].intrinsics[0] == pytest.approx(camera["intrinsics"]["fx"])
+        assert 0.3 <= camera["height_m"] <= 2.5
+        cameras.append(camera)
     assert cameras[0] != cameras[1]
     with pytest.raises(deepfusion.DeepFusionError, match="only varied drives have this scene") as refused:
         deepfusion.simulate(tmp_path / "plain", frames=1, scene="country")
@@ -76,7 +76,7 @@ def test_arrays_are_made_once(drive):
         assert getattr(seen, name) is getattr(seen, name), name
 
 
-def test_how_far_to_trust_a_pixel(drive, model):
+def test_the_confidence_of_a_pixel(drive, model):
     """exp(-expected error), computed from the standard deviation."""
     frame = deepfusion.Dataset(drive)[0]
     seen = deepfusion.load("street").predict(frame.image, frame.intrinsics)
@@ -87,7 +87,7 @@ def test_how_far_to_trust_a_pixel(drive, model):
     assert model.predict(frame.image, frame.intrinsics).confidence is None
 
 
-def test_how_sure_it_is_is_the_commands(drive, tmp_path):
+def test_sigma_is_the_commands(drive, tmp_path):
     """`street` has factors that scale its predicted sigma."""
     command = os.environ.get("DEEPFUSION") or str(Path(sysconfig.get_path("scripts")) / "deepfusion")
     frame = deepfusion.Dataset(drive)[0]
@@ -250,7 +250,7 @@ def test_a_frame_is_an_image(drive, model):
     assert other.intrinsics == (100, 100, 160, 48) and not np.array_equal(other.depth, expected.depth)
 
 
-def test_the_view_is_a_camera(drive, model):
+def test_a_field_of_view_is_a_camera(drive, model):
     frame = deepfusion.Dataset(drive)[0]
     width = frame.image.shape[1]
     fx, fy, cx, cy = model.predict(frame.image, hfov_deg=90).intrinsics
@@ -294,12 +294,12 @@ def test_what_a_recording_lacks_can_be_given(drive, tmp_path):
         report = deepfusion.doctor(folder, hfov_deg=90)
         assert report["drives"][0]["frames"] == 3
         assert deepfusion.doctor(folder)["drives"] == []
-    for wrong, said in [
+    for wrong, expected in [
         ({"topics": {"image": ""}}, "topics"),
         ({"topics": {"pictures": "/a"}}, "unknown role"),
         ({"hfov_deg": 90, "intrinsics": camera}, "hfov_deg"),
     ]:
-        with pytest.raises(ValueError, match=said):
+        with pytest.raises(ValueError, match=expected):
             deepfusion.Dataset(folder, **wrong)
     with pytest.raises(TypeError, match="topics"):
         deepfusion.Dataset(folder, topics=["image"])
@@ -311,8 +311,8 @@ def test_what_a_recording_lacks_can_be_given(drive, tmp_path):
 def test_a_log_by_itself(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("time_s,speed_mps\n" + "".join(f"{i / 10},{5 + i % 7}\n" for i in range(200)))
-    said = subprocess.run([sys.executable, "-m", "deepfusion", "doctor", str(log), "--json"], capture_output=True, check=False)
-    assert deepfusion.doctor(log) == json.loads(said.stdout)
+    printed = subprocess.run([sys.executable, "-m", "deepfusion", "doctor", str(log), "--json"], capture_output=True, check=False)
+    assert deepfusion.doctor(log) == json.loads(printed.stdout)
     with pytest.raises(deepfusion.DeepFusionError, match="no camera"):
         deepfusion.doctor(log, hfov_deg=90)
 
@@ -373,14 +373,14 @@ def test_one_thread_takes_predictions(drive, model):
 
 def test_an_array_that_is_no_image_says_how_to_convert_it(drive, model):
     image = deepfusion.Dataset(drive)[0].image
-    for wrong, said in [
+    for wrong, expected in [
         (image / np.float32(255), "found float32 96 x 320 x 3.*astype"),
-        (image[..., 0], "96 x 320: of grey"),
-        (np.dstack([image, image[..., :1]]), r"96 x 320 x 4: image\[\.\.\., :3\]"),
+        (image[..., 0], "96 x 320: for grey"),
+        (np.dstack([image, image[..., :1]]), r"96 x 320 x 4: give image\[\.\.\., :3\]"),
         (image.transpose(2, 0, 1), "transpose"),
         (image[None], "predict_many"),
     ]:
-        with pytest.raises((TypeError, ValueError), match=said):
+        with pytest.raises((TypeError, ValueError), match=expected):
             model.predict(wrong)
     with pytest.raises(TypeError, match="3 x 3 matrix"):
         model.predict(image, "the camera")
@@ -417,7 +417,7 @@ def test_doubts_about_a_recording_are_warnings(drive, tmp_path):
             deepfusion.Dataset(folder)
 
 
-def test_the_metrics_are_the_fields():
+def test_the_metrics_are_the_usual_ones():
     rng = np.random.default_rng(3)
     truth = rng.uniform(1, 70, (20, 30))
     truth[rng.random(truth.shape) < 0.5] = 0
@@ -580,8 +580,8 @@ def test_the_child_of_a_fork_computes(drive):
 def test_doctor(drive, tmp_path):
     report = deepfusion.doctor(drive)
     assert report["drives"][0]["frames"] == 3
-    said = subprocess.run([sys.executable, "-m", "deepfusion", "doctor", str(drive), "--json"], capture_output=True, check=False)
-    assert report == json.loads(said.stdout), "as the command prints it"
+    printed = subprocess.run([sys.executable, "-m", "deepfusion", "doctor", str(drive), "--json"], capture_output=True, check=False)
+    assert report == json.loads(printed.stdout), "as the command prints it"
     assert deepfusion.doctor(tmp_path)["recording"]
 
 
@@ -636,10 +636,10 @@ def test_help_says_what_the_stubs_say():
     compared = 0
     for group in (node for node in stubs.body if isinstance(node, ast.ClassDef)):
         for method in (node for node in group.body if isinstance(node, ast.FunctionDef)):
-            said = ast.get_docstring(method)
+            docstring = ast.get_docstring(method)
             # Constructors have no docstring of their own.
-            if said and method.name != "__new__":
+            if docstring and method.name != "__new__":
                 there = getattr(getattr(deepfusion, group.name), method.name).__doc__
-                assert there and inspect.cleandoc(there) == said, f"{group.name}.{method.name}"
+                assert there and inspect.cleandoc(there) == docstring, f"{group.name}.{method.name}"
                 compared += 1
     assert compared > 20

@@ -127,7 +127,7 @@ def test_broken_images_are_named_and_the_others_done(street, tmp_path):
         cluster.predict(folder, "tiny", tmp_path / "out", save=["sigma"])
 
 
-def test_how_sure_the_network_is(street, tmp_path):
+def test_uncertainty_is_saved(street, tmp_path):
     kinds = ["sigma", "confidence"]
     summary = cluster.predict(street / "left" / "0.png", "street", tmp_path, intrinsics=CAMERA, save=kinds)
     assert summary.done == 1
@@ -356,7 +356,7 @@ def test_a_fleets_recording_comes_with_the_files_beside_it(tmp_path, bucket):
     assert cluster.inspect([url], storage_options=options)[0]["usable_pairs"] == 3
 
 
-def test_what_belongs_to_a_recording_is_known_by_its_name(memory, monkeypatch):
+def test_files_of_a_recording_are_known_by_their_names(memory, monkeypatch):
     monkeypatch.setattr(_storage, "_MOST_BESIDE", 100)
     for name in ["drive.mp4", "drive.toml", "drive.csv", "dataset.toml", "calibration.yml", "other.mp4", "other.toml", "deep/dataset.toml"]:
         memory.pipe_file(f"/fleet/{name}", b"x")
@@ -599,7 +599,7 @@ SHORTER = [
 ]
 
 
-def test_what_the_guide_shows_runs(tmp_path, monkeypatch):
+def test_the_code_of_the_guide_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text(), re.DOTALL)
     assert len(blocks) >= 5
@@ -637,6 +637,6 @@ def test_trials_share_the_arguments_of_training(street):
     """And each is given its device."""
     learning = _tune._learning("none", [street], "3", 0, None)
     assert learning == {"init": "none", "validation": [str(street)], "camera": "3", "device": "cpu"}
-    for gpus, device, said in [(-1, None, "gpus_per_trial"), (0, "auto", "needs gpus_per_trial"), (1, "cpu", "idle")]:
-        with pytest.raises(ValueError, match=said):
+    for gpus, device, expected in [(-1, None, "gpus_per_trial"), (0, "auto", "needs gpus_per_trial"), (1, "cpu", "idle")]:
+        with pytest.raises(ValueError, match=expected):
             _tune._learning(None, None, None, gpus, device)

@@ -17,7 +17,7 @@ def blocks(readme):
 
 
 @pytest.mark.parametrize("readme", [PACKAGE / "README.md", PACKAGE.parent / "README.md"], ids=["package", "project"])
-def test_what_it_shows_runs(readme, tmp_path, monkeypatch):
+def test_the_code_it_shows_runs(readme, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     street = deepfusion.simulate("one-image", frames=1, seed=3, size=(1242, 375), scan_every=0)
     Image.fromarray(deepfusion.Dataset(street)[0].image).save("street.jpg")

@@ -182,7 +182,7 @@ def test_wrong_configurations_say_what_is_wrong(run, street, tmp_path):
     assert "light" in wrong("lihgt", street)
     assert "batsch" in wrong({"batsch": 3}, street)
     assert "many" in wrong({"batch": "many"}, street)
-    assert "nothing to learn" in wrong("tiny")
+    assert "no recordings to train on" in wrong("tiny")
     assert "nowhere" in wrong("tiny", tmp_path / "nowhere")
     assert "no-such-network" in wrong(SMALL, street, init="no-such-network")
     assert "not empty" in wrong(SMALL, street, out=run[0].path)
@@ -262,7 +262,7 @@ def test_ctrl_c_ends_other_long_calls(street, tmp_path):
 
 @pytest.mark.skipif(os.name != "posix", reason="makes a pipe, sends SIGINT")
 @pytest.mark.parametrize("call", ["Dataset", "load"])
-def test_ctrl_c_ends_what_reads_for_long(run, street, tmp_path, call):
+def test_ctrl_c_ends_long_reading(run, street, tmp_path, call):
     """A file that never arrives simulates a large recording, or weights on a slow disk."""
     if call == "Dataset":
         date = tmp_path / street.parent.name

@@ -11,7 +11,7 @@ use crate::cli::EngineArgs;
 use crate::devices;
 use crate::failure::Result;
 
-/// Loads a network with the engine asked for.
+/// Loads a network with the chosen engine.
 pub(crate) fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstimator> {
     let network = model.load(args.set.as_deref())?;
     let int8 = args.settings().calibration(&network)?;
@@ -21,7 +21,7 @@ pub(crate) fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstima
     })?)
 }
 
-/// The engine asked for, with a network of this configuration, these weights and this calibration.
+/// The chosen engine, with a network of this configuration, these weights and this calibration.
 pub(crate) fn runner(
     args: &EngineArgs,
     config: &TrainConfig,

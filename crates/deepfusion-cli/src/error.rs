@@ -1,4 +1,4 @@
-//! The failures that only the command line knows.
+//! The errors that only the command line raises.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use deepfusion_sim::VariedConflict;
 
 use crate::failure::{Exit, Reportable};
 
-/// Failures that only the command line knows.
+/// Errors that only the command line raises.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CliError {
     /// Something that would be overwritten.
@@ -87,7 +87,7 @@ pub(crate) enum CliError {
     )]
     #[error("{what} needs the training framework, which this build leaves out")]
     BuiltWithoutTraining {
-        /// What was asked for.
+        /// The command or option.
         what: &'static str,
     },
     /// An option that writes into a run's folder, for a network without one.
@@ -302,8 +302,8 @@ impl Reportable for CliError {
                 Some("give a name that ends in .bag for a ROS 1 bag, or another folder for KITTI raw".into())
             }
             Self::SomeFailed { hint, resumes, .. } => Some(match hint {
-                Some(hint) => format!("{hint}; then {}", again(*resumes)),
-                None => format!("fix them, then {}", again(*resumes)),
+                Some(hint) => format!("{hint}; then {}", how_to_continue(*resumes)),
+                None => format!("fix them, then {}", how_to_continue(*resumes)),
             }),
             Self::Unfit { .. } => Some("follow the hints above; --verbose prints every measurement".into()),
             Self::Unreadable { unreadable, recordings, hint, .. } => Some(format!(
@@ -314,7 +314,7 @@ impl Reportable for CliError {
             Self::OutputsAlone { .. } => Some("give the images that they were made from".into()),
             Self::TablesInPicture { .. } => Some("give --out another ending, such as .html or .txt".into()),
             Self::NotAFolder { .. } => Some("give --out a folder; it is created if it does not exist".into()),
-            Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),
+            Self::Interrupted { resumes, .. } => Some(how_to_continue(*resumes).to_owned()),
             Self::Stopped { go_on, .. } => Some(format!("continue with: {go_on}")),
             Self::Moved { option: Some(option), .. } => Some(format!(
                 "if it was moved, give its new path: {option} PATH; if its disk is not mounted, mount it"
@@ -340,7 +340,7 @@ impl Reportable for CliError {
             Self::OnlyLive { .. } => {
                 Some("leave it out, or give camera:0, an address such as rtsp://…, or - for standard input".into())
             }
-            Self::Unwatched { .. } => Some("leave it out, or give recordings with speed and yaw rate alone".into()),
+            Self::Unwatched { .. } => Some("leave it out, or give only recordings with speed and yaw rate".into()),
             Self::CorrectShard => Some("leave out --shard, and give each run its own recordings".into()),
             Self::VideoShard => {
                 Some("save side-by-side in the shards, then run once more with --save video and without --shard".into())
@@ -403,7 +403,7 @@ fn counted(texts: &[String]) -> Vec<(&str, usize)> {
 }
 
 /// How to continue a bulk run.
-fn again(resumes: bool) -> &'static str {
+fn how_to_continue(resumes: bool) -> &'static str {
     if resumes {
         "run the same command again: finished images are kept"
     } else {

@@ -224,14 +224,14 @@ fn libraries_name_no_options() {
             let source = fs::read_to_string(&file).unwrap();
             let lines = source.lines().map(str::trim_start);
             let comments = lines.filter(|line| line.starts_with("//"));
-            for said in literals(&source).into_iter().chain(comments) {
-                let mut text = format!(" {}", said.replace(['`', '('], " "));
+            for passage in literals(&source).into_iter().chain(comments) {
+                let mut text = format!(" {}", passage.replace(['`', '('], " "));
                 for known in allowed {
                     text = text.replace(&known.replace('`', " "), "");
                 }
                 let mut after = text.split(" --").skip(1);
                 if after.any(|option| option.starts_with(|c: char| c.is_ascii_lowercase())) {
-                    wrong.push(format!("{}: {said}", file.display()));
+                    wrong.push(format!("{}: {passage}", file.display()));
                 }
             }
         }

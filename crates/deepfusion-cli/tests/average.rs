@@ -70,8 +70,8 @@ fn a_mean_of_runs_counts_as_trained_on_all_their_drives() {
         fs::write(at.join("copy.toml"), text).unwrap();
         let off = run(at, "train --config copy.toml --data nowhere --out off");
         assert!(off.stderr.contains("nowhere"), "{}", off.stderr);
-        let said = off.stderr.contains("mean of 2 networks");
-        assert_eq!(said, warns, "{}", off.stderr);
+        let is_warned = off.stderr.contains("mean of 2 networks");
+        assert_eq!(is_warned, warns, "{}", off.stderr);
         let mut warnings = off.stderr.lines().filter(|line| line.contains("WARN"));
         assert!(
             warnings.all(|line| !line.contains("--init")),
@@ -161,11 +161,11 @@ fn hides_the_embedded_network(at: &Path) {
         "train --data third --size 96x64 --batch 2 --steps 1 --init {name} --out from-{name}"
     );
     let average = format!("weights average a {name} --out again");
-    for said in [bench(name), ok(at, &train).stderr, ok(at, &average).stderr] {
-        let about = said.lines().filter(|line| line.contains("WARN"));
+    for printed in [bench(name), ok(at, &train).stderr, ok(at, &average).stderr] {
+        let about = printed.lines().filter(|line| line.contains("WARN"));
         let about: Vec<&str> = about.filter(|line| line.contains("embedded")).collect();
-        assert_eq!(about.len(), 1, "{said}");
-        assert!(about[0].contains(&format!("./{name}")), "{said}");
+        assert_eq!(about.len(), 1, "{printed}");
+        assert!(about[0].contains(&format!("./{name}")), "{printed}");
     }
     for path in [format!("./{name}"), format!("{name}/")] {
         assert!(!bench(&path).contains("WARN"), "{path}");

@@ -415,8 +415,8 @@ fn a_damaged_bag_does_not_hide_the_others() {
     std::fs::remove_file(bag.with_extension("toml")).unwrap();
     let written = run(at, "data inspect sim --write-config --overwrite");
     assert_eq!(written.code, 1, "{}", written.stderr);
-    let said = "sim: 1 of 2 recordings cannot be read";
-    assert!(written.stderr.contains(said), "{}", written.stderr);
+    let expected = "sim: 1 of 2 recordings cannot be read";
+    assert!(written.stderr.contains(expected), "{}", written.stderr);
     assert!(!bag.with_extension("toml").exists());
     let kept = std::fs::read_to_string(other.with_extension("toml")).unwrap();
     assert_eq!(kept, camera);
@@ -443,8 +443,8 @@ fn the_reasons_why_bags_cannot_be_read_are_reported() {
     }
     let listed = run(at, "data inspect sim");
     assert_eq!(listed.code, 1, "{}", listed.stderr);
-    let said = "sim: 3 of 3 recordings cannot be read";
-    assert!(listed.stderr.contains(said), "{}", listed.stderr);
+    let expected = "sim: 3 of 3 recordings cannot be read";
+    assert!(listed.stderr.contains(expected), "{}", listed.stderr);
     let others = listed.stderr.contains("the others");
     assert!(!others, "{}", listed.stderr);
     std::fs::remove_file(at.join("sim/c.bag")).unwrap();

@@ -174,7 +174,7 @@ impl Drive {
     }
 
     /// Asserts that every frame has the right picture and time: the bag's frames are the pictures from the `first` on.
-    fn came_back(&self, bag: &Path, first: usize) {
+    fn assert_frames(&self, bag: &Path, first: usize) {
         let drive = open(bag).unwrap();
         assert_eq!(drive.frames().len(), FRAMES - first);
         // In any order, as training reads them.
@@ -305,7 +305,7 @@ fn frames_of_every_kind_come_back_in_order() {
             ("image", Kind::Image, "h264"),
         ] {
             let bag = drive.bag(&format!("{name}.bag"), kind, format, &packets);
-            drive.came_back(&bag, 0);
+            drive.assert_frames(&bag, 0);
         }
         let cache = drive.at().join("video.bag.camera.image_rect.ffmpeg.frames");
         // The frames, and the record of what they were made from; they are not made again.
@@ -322,7 +322,7 @@ fn frames_of_every_kind_come_back_in_order() {
         if let Some(packets) = drive.encode(encoder, &[]) {
             let name = format!("{format}.bag");
             let bag = drive.bag(&name, Kind::Video, format, &some(&packets));
-            drive.came_back(&bag, 0);
+            drive.assert_frames(&bag, 0);
         }
     }
 }
@@ -369,7 +369,7 @@ fn the_command_reads_a_stream_as_it_reads_images() {
     let name = "drive.bag.camera.image_rect.ffmpeg";
     let cache = frames_folder(&at.join("scratch"), &bag, name);
     assert_eq!(fs::read_dir(&cache).unwrap().count(), FRAMES + 1);
-    drive.came_back(&bag, 0);
+    drive.assert_frames(&bag, 0);
 }
 
 #[test]
@@ -381,12 +381,12 @@ fn frames_before_the_first_key_frame_are_left_out_with_a_warning() {
     let mut late = some(&packets);
     late[..3].fill(None);
     let bag = drive.bag("late.bag", Kind::Packet, "h264", &late);
-    drive.came_back(&bag, KEYS);
+    drive.assert_frames(&bag, KEYS);
     let opened = open(&bag).unwrap();
     let warnings: Vec<String> = opened.warnings().iter().map(ToString::to_string).collect();
     let warnings = warnings.join("\n");
-    let said = format!("/camera/image_rect/ffmpeg: the first {} messages", KEYS - 3);
-    assert!(warnings.contains(&said), "{warnings}");
+    let expected = format!("/camera/image_rect/ffmpeg: the first {} messages", KEYS - 3);
+    assert!(warnings.contains(&expected), "{warnings}");
 
     // Without any key frame there are no images.
     let mut none = some(&packets);
@@ -521,9 +521,9 @@ fn a_missing_ffmpeg_is_an_error_with_a_hint() {
         .env("PATH", &nowhere)
         .output()
         .unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let printed = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{printed}");
     for part in ["ffmpeg is needed to read videos", "hint: install ffmpeg"] {
-        assert!(said.contains(part), "{said}");
+        assert!(printed.contains(part), "{printed}");
     }
 }

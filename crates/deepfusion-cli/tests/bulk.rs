@@ -136,11 +136,11 @@ fn the_first_of_each_recording_are_done_alone() {
         fs::copy(at.join(DRIVE).join(&name), at.join("more").join(&name)).unwrap();
     }
     let predict = "predict sim more --model tiny --save npy --out out";
-    let said = ok(at, &format!("{predict} --frames 2")).stderr;
-    assert!(said.contains("4 images written"), "{said}");
+    let printed = ok(at, &format!("{predict} --frames 2")).stderr;
+    assert!(printed.contains("4 images written"), "{printed}");
     // The outputs' names are the same as for the whole.
-    let said = ok(at, predict).stderr;
-    assert!(said.contains("3 images written"), "{said}");
+    let printed = ok(at, predict).stderr;
+    assert!(printed.contains("3 images written"), "{printed}");
     let line = ok(
         at,
         "perceive sim --model tiny --frames 1 --save depth-png --out seen --json",
@@ -158,29 +158,29 @@ fn a_camera_that_may_be_wrong_gives_a_warning() {
     );
     let predict = format!("predict {DRIVE}/0000000000.png --model tiny");
     // No camera is given, and KITTI's calibration is some folders up.
-    let said = ok(at, &format!("{predict} --out a")).stderr;
+    let printed = ok(at, &format!("{predict} --out a")).stderr;
     let calibration = Path::new("2026_01_01").join("calib_cam_to_cam.txt");
     assert!(
-        said.contains("--calib") && said.contains(calibration.to_str().unwrap()),
-        "{said}"
+        printed.contains("--calib") && printed.contains(calibration.to_str().unwrap()),
+        "{printed}"
     );
     // Intrinsics of images of twice the size, and of half the size.
     for (intrinsics, out) in [("112,112,95,63", "b"), ("28,28,23.5,15.5", "c")] {
-        let said = ok(
+        let printed = ok(
             at,
             &format!("{predict} --intrinsics {intrinsics} --out {out}"),
         )
         .stderr;
-        assert!(said.contains("images of another size"), "{said}");
+        assert!(printed.contains("images of another size"), "{printed}");
     }
     // The image's own intrinsics, and those of an image that was cut at the top.
     for (intrinsics, out) in [("56,56,47,31", "d"), ("56,56,47,8", "e")] {
-        let said = ok(
+        let printed = ok(
             at,
             &format!("{predict} --intrinsics {intrinsics} --out {out}"),
         )
         .stderr;
-        assert!(!said.contains("WARN"), "{said}");
+        assert!(!printed.contains("WARN"), "{printed}");
     }
 }
 
@@ -197,10 +197,10 @@ fn an_image_of_extreme_size_gives_a_warning() {
     }
     let predict = |input: &str, out: &str| {
         let args = format!("predict odd/{input} --model tiny --save npy --out {out}");
-        let said = ok(at, &args).stderr;
+        let printed = ok(at, &args).stderr;
         let about =
             |line: &&str| line.contains("WARN") && line.contains("not trained on such images");
-        said.lines().filter(about).count()
+        printed.lines().filter(about).count()
     };
     assert_eq!(predict("c.png", "fits"), 0);
     assert_eq!(predict("", "all"), 1);
@@ -336,7 +336,7 @@ fn a_broken_image_is_named_and_the_others_are_done() {
     fs::write(&broken, &whole).unwrap();
     let mended = ok(at, &predict);
     assert!(
-        mended.stderr.contains("1 image written") && mended.stderr.contains("29 were there"),
+        mended.stderr.contains("1 image written") && mended.stderr.contains("29 existed already"),
         "{}",
         mended.stderr
     );
@@ -409,10 +409,10 @@ fn the_pictures_of_a_recording_become_a_video() {
         .env("PATH", at)
         .output()
         .unwrap();
-    let said = String::from_utf8(without.stderr).unwrap();
+    let printed = String::from_utf8(without.stderr).unwrap();
     assert!(
-        !without.status.success() && said.contains("ffmpeg is needed to write videos"),
-        "{said}"
+        !without.status.success() && printed.contains("ffmpeg is needed to write videos"),
+        "{printed}"
     );
     assert!(!at.join("out").exists());
     let there = Command::new("ffmpeg").arg("-version").output();

@@ -147,12 +147,12 @@ fn a_board_is_enough() {
     let read = |name: &str| fs::read_to_string(at.join(name)).unwrap();
     assert!(read("sized.yaml").contains("squares of 0.025 m"));
     assert!(!read("camera.yaml").contains("squares"));
-    let said = ok(
+    let printed = ok(
         at,
         "calibrate pictures --board 9x6 --square 25 --out mm.yaml",
     )
     .stderr;
-    assert!(said.contains("in metres, not millimetres"), "{said}");
+    assert!(printed.contains("in metres, not millimetres"), "{printed}");
 }
 
 /// A file with an impossible image size: no memory is allocated for it.

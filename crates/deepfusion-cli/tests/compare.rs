@@ -119,8 +119,11 @@ fn runs_are_reported_kept_and_compared() {
         at,
         "compare a b --format html --pictures sim --picture-count 2 --out c.html",
     );
-    let said = &written.stderr;
-    assert!(said.contains("c.png") && said.contains("c.html"), "{said}");
+    let notes = &written.stderr;
+    assert!(
+        notes.contains("c.png") && notes.contains("c.html"),
+        "{notes}"
+    );
     assert!(page(&at.join("c.html")).contains("<div class=\"grid\""));
     let sheet = fs::read(at.join("c.png")).unwrap();
     assert!(sheet.starts_with(b"\x89PNG"));

@@ -11,7 +11,7 @@ fn has_network() -> bool {
 }
 
 /// Asserts that the files of a demo exist and are not empty.
-fn are_there(demo: &Path, files: &[&str]) {
+fn assert_files_exist(demo: &Path, files: &[&str]) {
     for file in files {
         let length = fs::metadata(demo.join(file)).map_or(0, |file| file.len());
         assert!(length > 0, "{file}");
@@ -29,7 +29,7 @@ fn the_demo_shows_the_embedded_network_and_what_learning_adds() {
     let demo = "demo --out first --frames 12 --steps 1 --size 192x64";
     let run = ok(at, demo);
     assert_eq!(run.stdout.trim(), "first/report.html");
-    for said in [
+    for part in [
         "1/4",
         "2/4",
         "3/4",
@@ -37,13 +37,13 @@ fn the_demo_shows_the_embedded_network_and_what_learning_adds() {
         "an image became metres",
         "done in",
     ] {
-        assert!(run.stderr.contains(said), "{said}: {}", run.stderr);
+        assert!(run.stderr.contains(part), "{part}: {}", run.stderr);
     }
     // Trained on seven of twelve frames, evaluated on the last four.
     let split = |name: &str| fs::read_to_string(at.join("first").join(name)).unwrap();
     assert_eq!(split("learned.txt").lines().count(), 7);
     assert_eq!(split("measured.txt").lines().count(), 4);
-    are_there(
+    assert_files_exist(
         &at.join("first"),
         &[
             "pictures/0000000009_side.png",
@@ -77,7 +77,7 @@ fn the_demo_from_scratch_ends_in_a_report() {
         "demo --from-scratch --out anew --frames 12 --steps 2 --size 192x64 --json",
     );
     assert_eq!(report["n"], 2, "every eighth of twelve frames: {report}");
-    are_there(
+    assert_files_exist(
         &at.join("anew"),
         &[
             "pictures/0000000001_side.png",
@@ -111,19 +111,19 @@ fn the_demo_can_be_stopped_while_it_simulates() {
         .spawn()
         .unwrap();
     let mut stderr = BufReader::new(child.stderr.take().unwrap());
-    let mut said = String::new();
-    while !said.contains("1/4") {
-        assert!(stderr.read_line(&mut said).unwrap() > 0, "{said}");
+    let mut text = String::new();
+    while !text.contains("1/4") {
+        assert!(stderr.read_line(&mut text).unwrap() > 0, "{text}");
     }
     let pid = child.id().to_string();
     let sent = Command::new("kill").args(["-INT", &pid]).status().unwrap();
     assert!(sent.success());
-    stderr.read_to_string(&mut said).unwrap();
+    stderr.read_to_string(&mut text).unwrap();
     let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert_eq!(output.status.code(), Some(130), "{text}");
     assert_eq!(output.stdout, b"");
     for part in ["stopping after", "the demo was stopped", "another folder"] {
-        assert!(said.contains(part), "{said}");
+        assert!(text.contains(part), "{text}");
     }
     let left = fs::read_dir(at.join("stopped")).unwrap().count();
     assert_eq!(left, 0, "it stopped before the end of the drive");

@@ -247,7 +247,7 @@ fn every_command_warns_of_a_camera_of_another_size() {
     for (command, expected) in [
         (
             &*format!("{train} half"),
-            ["not usable for training: cx", "hint: give the matrix"],
+            ["not usable for training: cx", "hint: scale the matrix"],
         ),
         (
             "predict sim --model right --out depth",
@@ -258,9 +258,13 @@ fn every_command_warns_of_a_camera_of_another_size() {
             ["is far from the middle of 160x96", "another size"],
         ),
     ] {
-        let said = ok(at, command).stderr;
+        let printed = ok(at, command).stderr;
         let about = |line: &&str| expected.iter().all(|part| line.contains(part));
-        assert_eq!(said.lines().filter(about).count(), 1, "{command}: {said}");
+        assert_eq!(
+            printed.lines().filter(about).count(),
+            1,
+            "{command}: {printed}"
+        );
     }
 }
 

@@ -144,8 +144,8 @@ fn a_varied_drive_records_what_was_drawn() {
     let made = json(at, &format!("{small} --varied --seed 5 --out five"));
     let drive = at.join(made["drive"].as_str().unwrap());
     let text = std::fs::read_to_string(drive.join("varied.json")).unwrap();
-    let said: serde_json::Value = serde_json::from_str(&text).unwrap();
-    assert_eq!(said, made["varied"]);
+    let recorded: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(recorded, made["varied"]);
     let inspected = json(at, "data inspect five --json");
     assert_eq!(inspected["size"], serde_json::json!([64, 48]));
     let other = json(at, &format!("{small} --varied --seed 6 --out six"));
@@ -206,7 +206,7 @@ fn a_varied_street_that_blocks_cars_gives_a_warning() {
 
 /// Velocities are exported beside depths and never mistaken for them.
 #[test]
-fn a_bag_s_velocities_are_exported_beside_its_depths() {
+fn a_bags_velocities_are_exported_beside_its_depths() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(

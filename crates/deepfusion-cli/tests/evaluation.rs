@@ -80,7 +80,7 @@ fn a_model_is_evaluated_on_traffic_and_along_the_road() {
 
 /// Post-processing, points as a table, and depth images instead of scans.
 #[test]
-fn the_protocols_of_the_fields_tables() {
+fn the_protocols_of_published_tables() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(

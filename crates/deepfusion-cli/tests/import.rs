@@ -55,18 +55,21 @@ fn a_log_beside_its_images_is_a_drive() {
     let at = folder.path();
     let (log, truth) = write_drive(at);
     let import = "data import torque.csv --zone +01:00 --images images --intrinsics 92.95,184.71,78.09,43.88";
-    let said = ok(at, &format!("{import} --out drive"));
+    let made = ok(at, &format!("{import} --out drive"));
     assert!(
-        said.stderr
+        made.stderr
             .contains("speed from column 'Speed (OBD)(km/h)' in km/h"),
         "{}",
-        said.stderr
+        made.stderr
     );
-    assert!(!said.stderr.contains("still to do"), "{}", said.stderr);
+    assert!(!made.stderr.contains("still to do"), "{}", made.stderr);
     let no_camera = "data import torque.csv --zone +01:00 --images images --out no-camera";
-    let said = ok(at, no_camera).stderr;
-    assert!(said.contains("no calibration of its camera"), "{said}");
-    assert!(said.contains("hfov_deg = 70"), "{said}");
+    let printed = ok(at, no_camera).stderr;
+    assert!(
+        printed.contains("no calibration of its camera"),
+        "{printed}"
+    );
+    assert!(printed.contains("hfov_deg = 70"), "{printed}");
     fs::copy(at.join("frames.csv"), at.join("drive/frames.csv")).unwrap();
     let imported = json(at, "data inspect drive --json");
     let mean = |inspection: &Value| inspection["speed_mps"]["mean"].as_f64().unwrap();

@@ -96,7 +96,7 @@ fn a_network_is_calibrated_and_measured_in_int8() {
 }
 
 #[test]
-fn what_cannot_be_calibrated_is_an_error() {
+fn a_network_that_cannot_be_calibrated_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::create_dir(at.join("empty")).unwrap();

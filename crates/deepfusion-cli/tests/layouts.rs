@@ -107,11 +107,11 @@ fn files_that_are_not_read_are_reported_for_the_folder() {
     let at = folder.path();
     ok(at, "simulate --out sim --frames 6 --size 96x64");
     fs::write(at.join("sim/drive.mp4"), "").unwrap();
-    let said = ok(at, "data convert sim copy").stderr;
-    let about = said.lines().filter(|line| line.contains("drive.mp4"));
+    let printed = ok(at, "data convert sim copy").stderr;
+    let about = printed.lines().filter(|line| line.contains("drive.mp4"));
     let about: Vec<&str> = about.collect();
-    assert_eq!(about.len(), 1, "{said}");
+    assert_eq!(about.len(), 1, "{printed}");
     let expected = "sim is read only as KITTI raw; this in it looks like a recording and is not read: drive.mp4";
-    assert!(about[0].contains(expected), "{said}");
-    assert!(!about[0].contains("_sync"), "{said}");
+    assert!(about[0].contains(expected), "{printed}");
+    assert!(!about[0].contains("_sync"), "{printed}");
 }

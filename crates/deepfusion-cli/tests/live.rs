@@ -12,7 +12,7 @@ use serde_json::Value;
 
 const CAMERA: &str = "--intrinsics 186,186,157,44";
 
-fn there_is_ffmpeg() -> bool {
+fn has_ffmpeg() -> bool {
     let answer = Command::new("ffmpeg").arg("-version").output();
     let there = answer.is_ok_and(|o| o.status.success());
     if !there {
@@ -47,7 +47,7 @@ fn files(folder: &Path) -> Vec<String> {
 }
 
 /// The lines of `targets.jsonl`; asserts that every file beside it is complete.
-fn whole(folder: &Path) -> Vec<Value> {
+fn complete_lines(folder: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(folder.join("targets.jsonl")).unwrap();
     let lines: Vec<Value> = text
         .lines()
@@ -83,7 +83,7 @@ fn number(line: &Value) -> u64 {
 
 #[test]
 fn frames_of_a_source_that_is_too_fast_are_skipped_without_delay() {
-    if !there_is_ffmpeg() {
+    if !has_ffmpeg() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -93,7 +93,7 @@ fn frames_of_a_source_that_is_too_fast_are_skipped_without_delay() {
     let args = format!("perceive --model run - {CAMERA} --out seen --speed 5 --json");
     let printed = piped(at, &args, stream(SENT));
     assert_eq!(printed.code, 0, "{}", printed.stderr);
-    let lines = whole(&at.join("seen"));
+    let lines = complete_lines(&at.join("seen"));
     assert_eq!(printed.stdout.lines().count(), lines.len());
     for (place, line) in lines.iter().enumerate() {
         // The gaps in the numbers are the frames that were skipped.
@@ -141,12 +141,12 @@ fn frames_of_a_source_that_is_too_fast_are_skipped_without_delay() {
     );
     let anew = piped(at, &format!("{args} --overwrite"), stream(1));
     assert_eq!(anew.code, 0, "{}", anew.stderr);
-    assert_eq!(whole(&at.join("seen")).len(), 1);
+    assert_eq!(complete_lines(&at.join("seen")).len(), 1);
 }
 
 #[test]
 fn prediction_of_a_stream_stops_at_the_given_frame() {
-    if !there_is_ffmpeg() {
+    if !has_ffmpeg() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -190,7 +190,7 @@ fn prediction_of_a_stream_stops_at_the_given_frame() {
 
 #[test]
 fn frames_before_the_connection_was_lost_are_kept() {
-    if !there_is_ffmpeg() {
+    if !has_ffmpeg() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -216,7 +216,7 @@ fn frames_before_the_connection_was_lost_are_kept() {
     ] {
         assert!(silent.stderr.contains(part), "{part}: {}", silent.stderr);
     }
-    assert!(!whole(&at.join("silent")).is_empty());
+    assert!(!complete_lines(&at.join("silent")).is_empty());
     // The server disconnects before it has sent what it announced.
     let (address, server) = serve(|mut connection| {
         for part in stream(60).chunks(200_000) {
@@ -233,7 +233,7 @@ fn frames_before_the_connection_was_lost_are_kept() {
     for part in ["lost the connection after", "ends prematurely", "hint:"] {
         assert!(gone.stderr.contains(part), "{part}: {}", gone.stderr);
     }
-    assert!(!whole(&at.join("gone")).is_empty());
+    assert!(!complete_lines(&at.join("gone")).is_empty());
 }
 
 #[test]
@@ -288,7 +288,7 @@ fn a_source_that_cannot_be_opened_is_an_error() {
         &absent,
         &["udp://127.0.0.1:1", "ffmpeg", "not installed", "PATH"],
     );
-    if !there_is_ffmpeg() {
+    if !has_ffmpeg() {
         return;
     }
     for command in ["perceive", "predict"] {
@@ -356,5 +356,5 @@ fn an_old_ffmpeg_is_given_its_old_option() {
     let args = format!("perceive --model run tcp://camera:1 {CAMERA} --out seen");
     let printed = with_path(at, &args, &path);
     assert_eq!(printed.code, 0, "{}", printed.stderr);
-    assert_eq!(whole(&at.join("seen")).len(), 1);
+    assert_eq!(complete_lines(&at.join("seen")).len(), 1);
 }

@@ -220,7 +220,7 @@ fn exact_depth_finds_the_simulators_boxes() {
 }
 
 /// A report of targets states which predictions their depth is the mean of. Targets of so few frames may not differ; that the option reaches
-/// the network is tested in [`what_is_wrong_is_named`], where a network of a single size refuses it.
+/// the network is tested in [`errors_name_their_cause`], where a network of a single size refuses it.
 #[test]
 fn a_report_states_which_predictions_its_depth_is_the_mean_of() {
     let folder = tempfile::tempdir().unwrap();
@@ -306,7 +306,7 @@ fn a_users_model_gives_targets_their_class() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_their_cause() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     street(at);

@@ -129,8 +129,8 @@ fn the_embedded_networks_are_made_and_packed_reproducibly() {
         command.env("INT8", if has_int8 { "" } else { "none" });
         command.env("KITTI", "kitti").env("ROOMS", "rooms");
         let output = command.output().unwrap();
-        let said = String::from_utf8(output.stderr).unwrap();
-        (output.status.code().unwrap(), said)
+        let printed = String::from_utf8(output.stderr).unwrap();
+        (output.status.code().unwrap(), printed)
     };
     let asked = |what: &str| {
         let log = fs::read_to_string(at.join("log")).unwrap();
@@ -138,12 +138,12 @@ fn the_embedded_networks_are_made_and_packed_reproducibly() {
     };
 
     fs::write(at.join("stop"), "").unwrap();
-    let (code, said) = run();
-    assert_eq!(code, 130, "{said}");
+    let (code, printed) = run();
+    assert_eq!(code, 130, "{printed}");
     assert_eq!(asked("train --config"), 2);
     fs::remove_file(at.join("stop")).unwrap();
-    let (code, said) = run();
-    assert_eq!(code, 0, "{said}");
+    let (code, printed) = run();
+    assert_eq!(code, 0, "{printed}");
     // The unfinished stage is continued, and finished ones are not repeated.
     assert_eq!(asked("train --out out/street-more --resume"), 1);
     assert_eq!(asked("train --config"), 7);
@@ -182,8 +182,8 @@ fn the_embedded_networks_are_made_and_packed_reproducibly() {
     }
 
     fs::remove_file(at.join("log")).unwrap();
-    let (code, said) = run();
-    assert_eq!(code, 0, "{said}");
+    let (code, printed) = run();
+    assert_eq!(code, 0, "{printed}");
     assert_eq!(asked("train") + asked("simulate") + asked("eval"), 0);
     assert!(packed() == first, "the same runs give the same bytes");
 }

@@ -300,7 +300,7 @@ fn a_missing_network_is_an_error_that_names_the_existing_ones() {
 
 /// The networks that this build embeds, if any: listed, used by default, and the start of new runs with the same layers.
 #[test]
-fn what_is_embedded_is_listed_and_used() {
+fn embedded_networks_are_listed_and_used() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let list = json(at, "weights list --json");

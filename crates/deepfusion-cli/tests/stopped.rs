@@ -26,15 +26,15 @@ fn stop(folder: &Path, args: &str, out: &Path) {
     let sent = Command::new("kill").args(["-INT", &pid]).status().unwrap();
     assert!(sent.success());
     let output = child.wait_with_output().unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{args}: {said}");
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{args}: {text}");
     assert_eq!(output.stdout, b"", "{args}");
     for part in [
         "stopping after the frames at work",
         "nothing is written: stopped after",
         "hint: start it again",
     ] {
-        assert!(said.contains(part), "{args}: {said}");
+        assert!(text.contains(part), "{args}: {text}");
     }
 }
 

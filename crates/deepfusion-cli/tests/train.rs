@@ -113,12 +113,15 @@ fn a_drive_is_trained_on_resumed_evaluated_and_predicted() {
     let measured = fs::read_to_string(at.join("measured/0000000001.json")).unwrap();
     let measured: Value = serde_json::from_str(&measured).unwrap();
     let near = |a: &Value, b: &Value| (a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-9;
-    let (said, found) = (&measured["scale"], &other["scale"]);
-    assert!(near(&said["bias"], &found["bias"]), "{said} {found}");
+    let (recorded, found) = (&measured["scale"], &other["scale"]);
+    assert!(
+        near(&recorded["bias"], &found["bias"]),
+        "{recorded} {found}"
+    );
     for end in 0..2 {
         assert!(
-            near(&said["ci95"][end], &found["bias_ci95"][end]),
-            "{said} {found}"
+            near(&recorded["ci95"][end], &found["bias_ci95"][end]),
+            "{recorded} {found}"
         );
     }
     // After two steps the scale cannot be trusted, whatever it happens to be.
@@ -261,16 +264,16 @@ fn a_stopped_run_is_saved_and_does_not_end_with_0() {
         let sent = Command::new("kill").args([signal, &pid]).status().unwrap();
         assert!(sent.success());
         let output = child.wait_with_output().unwrap();
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(130), "{signal}: {said}");
+        let printed = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(130), "{signal}: {printed}");
         assert_eq!(output.stdout, b"", "{signal}");
-        said
+        printed
     };
     let train = format!("train --data sim {SMALL} --steps 100000 --out run");
-    let said = stopped(&train, "-TERM", true);
+    let printed = stopped(&train, "-TERM", true);
     assert!(
-        said.contains("hint: continue with: deepfusion train --out run --resume"),
-        "{said}"
+        printed.contains("hint: continue with: deepfusion train --out run --resume"),
+        "{printed}"
     );
     assert!(at.join("run/last.safetensors").is_file());
     if !hangups_are_ignored() {
@@ -392,10 +395,10 @@ fn options_replace_their_own_part_of_a_file() {
     );
     // A file without `init` starts from random weights, which is printed if an embedded network would fit.
     let fits = deepfusion_weights::names().any(|name| name == "tiny");
-    let said = second
+    let is_printed = second
         .stderr
         .contains("starting from random weights, as the configuration has no `init` (--init tiny");
-    assert_eq!(said, fits, "{}", second.stderr);
+    assert_eq!(is_printed, fits, "{}", second.stderr);
     assert_eq!(data("second")["paths"][0], path("sim"));
     assert_eq!(data("second")["validation"][0], path("val"));
     // With --data: other recordings, and the file's validation.
@@ -445,7 +448,7 @@ fn options_replace_their_own_part_of_a_file() {
 }
 
 #[test]
-fn what_cannot_be_trained_on_is_an_error() {
+fn unusable_data_or_settings_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fails(at, "train --data nowhere", &["nowhere"]);
@@ -579,7 +582,7 @@ fn weights_trained_with_other_conventions_give_a_warning() {
 }
 
 #[test]
-fn weights_and_bench_say_what_they_do() {
+fn weights_are_listed_and_a_network_is_timed() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     assert!(ok(at, "weights list").stdout.contains("Monodepth2"));
@@ -608,7 +611,7 @@ fn weights_and_bench_say_what_they_do() {
 
 /// Two cameras are trained with each other's views, without speeds; one camera is refused.
 #[test]
-fn both_cameras_are_each_others_view() {
+fn each_of_two_cameras_is_a_view_of_the_other() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let street = "simulate --frames 8 --seed 3 --scan-every 0 --size 192x64";

@@ -114,8 +114,8 @@ fn uncertainty_is_evaluated_calibrated_and_written() {
     let eval = "eval --model sure --data other --crop none";
     let word = json(at, &format!("{eval} --json"));
     assert_eq!(word["intervals"]["calibrated"], false);
-    let said: Vec<f64> = levels(&word).iter().map(|row| row[0]).collect();
-    assert_eq!(said, [0.5, 0.8, 0.95]);
+    let nominal: Vec<f64> = levels(&word).iter().map(|row| row[0]).collect();
+    assert_eq!(nominal, [0.5, 0.8, 0.95]);
 
     for (command, names) in [
         (

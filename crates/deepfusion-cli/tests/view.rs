@@ -54,14 +54,17 @@ fn the_server_prints_its_address_answers_and_ends() {
     let killed = Command::new("kill").args(["-INT", &pid]).status().unwrap();
     assert!(killed.success());
     assert_eq!(process.wait().unwrap().code(), Some(0));
-    let mut said = String::new();
+    let mut text = String::new();
     process
         .stderr
         .take()
         .unwrap()
-        .read_to_string(&mut said)
+        .read_to_string(&mut text)
         .unwrap();
-    assert!(said.starts_with("1 frame in .; Ctrl-C ends\n"), "{said}");
+    assert!(
+        text.starts_with("1 frame in .; stop with Ctrl-C\n"),
+        "{text}"
+    );
 }
 
 #[cfg(not(feature = "rerun"))]

@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_files_content_is_known_by_length_and_checksum() {
+    fn content_is_identified_by_length_and_checksum() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a");
         std::fs::write(&path, "123456789").unwrap();

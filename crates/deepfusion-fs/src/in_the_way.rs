@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_hidden_is_named() {
+    fn hidden_leftovers_are_named() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("out");
         assert_eq!(in_the_way(&folder).unwrap(), None);

@@ -12,18 +12,18 @@ pub(crate) struct Machine {
 impl Machine {
     /// The machine that this process runs on.
     pub(crate) fn this() -> Self {
-        let said = |path: &str| {
+        let content = |path: &str| {
             let text = fs::read_to_string(path).unwrap_or_default();
             text.trim().to_owned()
         };
-        let mut name = said("/proc/sys/kernel/hostname");
+        let mut name = content("/proc/sys/kernel/hostname");
         if name.is_empty() {
             // Windows has the name there.
             name = std::env::var("COMPUTERNAME").unwrap_or_default();
         }
         Self {
             name,
-            boot: said("/proc/sys/kernel/random/boot_id"),
+            boot: content("/proc/sys/kernel/random/boot_id"),
         }
     }
 
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_is_known_by_its_start_or_its_name() {
+    fn a_machine_is_identified_by_its_start_or_its_name() {
         let this = machine("a", "1");
         for (other, expected) in [
             (machine("a", "1"), true),
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_is_what_its_text_says() {
+    fn a_machine_is_read_back_from_its_text() {
         for machine in [Machine::this(), machine("a", "1"), machine("", "")] {
             let text = machine.to_text();
             assert_eq!(Machine::from_text(&text), Some(machine));

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_that_were_made_go_or_stay() {
+    fn made_folders_are_removed_unless_kept() {
         let dir = tempfile::tempdir().unwrap();
         let there = dir.path().join("there");
         fs::create_dir(&there).unwrap();
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn where_none_can_be_made_none_is_left() {
+    fn a_failure_leaves_no_folders() {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("file");
         fs::write(&file, "x").unwrap();

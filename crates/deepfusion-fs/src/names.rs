@@ -106,7 +106,7 @@ mod tests {
 
     /// All threads look for a free name before any of them makes its folder.
     #[test]
-    fn folders_that_are_made_at_once_are_each_ones_own() {
+    fn folders_made_at_the_same_time_are_different() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("run");
         let made: HashSet<PathBuf> = std::thread::scope(|scope| {
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_name_is_cut_and_stays_its_own() {
+    fn a_long_name_is_cut_and_stays_unique() {
         assert_eq!(shortened("a_depth.png"), "a_depth.png");
         let fits = "x".repeat(LONGEST);
         assert_eq!(shortened(&fits), fits);
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_aside_is_named_by_its_place() {
+    fn a_temporary_path_is_replaced_by_its_target() {
         let (from, to) = (Path::new("out/.a.partial"), Path::new("out/a"));
         let moved = |path: &str| moved_path(path.into(), from, to);
         assert_eq!(moved("out/.a.partial/b/c"), Path::new("out/a/b/c"));

@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_count_by_their_values() {
+    fn numbers_are_compared_by_value() {
         for right in [
             &[
                 "frame_1.png",
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn digits_behind_a_point_are_a_fraction() {
+    fn digits_after_a_point_are_a_fraction() {
         let names = [
             "1305031102.png",
             "1305031102.1753.png",

@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn the_file_appears_whole() {
+    fn the_file_appears_complete() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.txt");
         type Write = fn(&Path) -> io::Result<()>;
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn no_folder_no_file() {
+    fn a_missing_folder_is_an_error() {
         let path = Path::new("no/such/folder/a.txt");
         let error = write_atomically(path, |e| e, |_| Ok(())).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::NotFound);
@@ -246,7 +246,7 @@ mod tests {
 
     /// The path of a file in the current folder names no folder; that folder must still be synced.
     #[test]
-    fn a_bare_name_is_of_this_folder() {
+    fn a_bare_name_is_in_the_current_folder() {
         let path = PathBuf::from(format!("bare-name-{}.txt", std::process::id()));
         write_atomically(&path, |e| e, |out| out.write_all(b"x")).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"x");
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn many_appear_together_or_their_files_aside_go() {
+    fn files_are_published_together_or_removed() {
         let dir = tempfile::tempdir().unwrap();
         std::fs::create_dir(dir.path().join("sub")).unwrap();
         let aside = |name: &str| {
@@ -278,7 +278,7 @@ mod tests {
 
     /// What a killed program left behind must not block the next one, whatever its process id.
     #[test]
-    fn two_of_one_process_never_share_a_name() {
+    fn temporary_names_of_a_process_are_unique() {
         let target = Path::new("out/a_depth.png");
         let (a, b) = (Partial::beside(target), Partial::beside(target));
         assert_ne!(a.path(), b.path());
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn a_watched_file_grows_under_a_name_that_readers_know() {
+    fn a_watched_file_grows_under_a_known_name() {
         let dir = tempfile::tempdir().unwrap();
         let (target, known) = (
             dir.path().join("a.jsonl"),

@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_committed_folder_appears_whole() {
+    fn a_committed_folder_appears_complete() {
         let dir = tempfile::tempdir().unwrap();
         let destination = dir.path().join("made/drive");
         let partial = filled(&destination, "whole");
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_dead_writer_left_goes_and_what_another_writes_stays() {
+    fn leftovers_of_dead_writers_are_removed_and_active_ones_stay() {
         let dir = tempfile::tempdir().unwrap();
         let destination = dir.path().join("drive");
         leftover(dir.path(), &here());
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn what_another_machine_left_or_writes_stays() {
+    fn partial_folders_of_another_machine_stay() {
         let dir = tempfile::tempdir().unwrap();
         for other in ["another\n00000000-0000-0000-0000-000000000000\n", "cut off"] {
             leftover(dir.path(), other);
@@ -347,7 +347,7 @@ mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn a_folder_that_cannot_get_its_name_back_stays_and_is_named() {
+    fn a_folder_that_cannot_be_restored_stays_and_is_named() {
         let dir = tempfile::tempdir().unwrap();
         let destination = dir.path().join("drive");
         let old = || {
@@ -368,15 +368,15 @@ mod tests {
         let (aside, kept) = old();
         let error = kept.put_back(refused());
         assert_eq!(error.kind(), ErrorKind::PermissionDenied);
-        let said = error.to_string();
-        assert!(said.contains(aside.to_str().unwrap()), "{said}");
+        let message = error.to_string();
+        assert!(message.contains(aside.to_str().unwrap()), "{message}");
         PartialFolder::remove_leftovers(dir.path());
         assert_eq!(content(&aside), "old");
         assert_eq!(names(dir.path()).len(), 2, "{:?}", names(dir.path()));
     }
 
     #[test]
-    fn files_get_their_names_together() {
+    fn files_are_renamed_together() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("new/out");
         let made = |content: &str| {

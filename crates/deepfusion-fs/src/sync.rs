@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_appears_with_all_that_is_in_it() {
+    fn a_folder_appears_with_all_its_content() {
         let dir = tempfile::tempdir().unwrap();
         let (aside, target) = (dir.path().join(".aside"), dir.path().join("drive"));
         std::fs::create_dir_all(aside.join("a/b")).unwrap();
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_cannot_be_synced() {
+    fn a_missing_file_cannot_be_synced() {
         let dir = tempfile::tempdir().unwrap();
         let none = dir.path().join("none");
         assert!(sync_files([&none]).is_err());

@@ -32,8 +32,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reason_that_says_what_to_do_has_its_own_hint() {
-        for (kind, said) in [
+    fn known_kinds_of_errors_have_their_own_hints() {
+        for (kind, expected) in [
             (ErrorKind::NotFound, "spelling"),
             (ErrorKind::PermissionDenied, "permissions"),
             (ErrorKind::ReadOnlyFilesystem, "written to"),
@@ -42,7 +42,7 @@ mod tests {
             (ErrorKind::TimedOut, "check the disk"),
         ] {
             let hint = system_hint(kind);
-            assert!(hint.contains(said), "{kind}");
+            assert!(hint.contains(expected), "{kind}");
         }
     }
 }

@@ -13,7 +13,7 @@ use serde::{Serialize, Serializer};
 use crate::Error;
 use crate::Result;
 
-/// What computes: this machine's processor, or a GPU through one of its interfaces.
+/// A backend: this machine's processor, or a GPU through one of its interfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backend {
     /// The processor.
@@ -61,7 +61,7 @@ impl Backend {
         }
     }
 
-    /// Whether this build has it: a GPU backend is a feature of the same name.
+    /// Whether this build has it: a GPU backend needs the feature of the same name.
     #[must_use]
     pub fn is_built(self) -> bool {
         match self {
@@ -303,7 +303,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_device_is_a_name_and_perhaps_an_index() {
+    fn a_device_is_a_name_with_an_optional_index() {
         for word in [
             "cpu", "vulkan", "wgpu", "cuda", "metal", "cuda:1", "vulkan:0",
         ] {
@@ -335,7 +335,7 @@ mod tests {
 
     /// The error for a wrong device lists the right ones.
     #[test]
-    fn a_wrong_word_is_answered_with_right_ones() {
+    fn the_error_for_an_unknown_device_lists_the_known_ones() {
         let hint = ComputeDevice::chosen("gpu").unwrap_err().hint().unwrap();
         assert!(hint.contains("cpu") && hint.contains("auto"), "{hint}");
         let hint = ComputeDevice::chosen("cuda:x").unwrap_err().hint().unwrap();

@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn videos_whose_names_differ_in_their_endings_are_two_drives() {
+    fn videos_whose_names_differ_in_their_extensions_are_two_drives() {
         let videos = ["cam.mp4", "cam.mov", "cam.mp4"].map(video);
         assert_eq!(first_of_drive(&videos), [0, 1, 0]);
     }

@@ -19,7 +19,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn durations_read_well() {
+    fn durations_have_readable_units() {
         assert_eq!(duration_text(75.4), "1:15 min");
         assert_eq!(duration_text(7_320.0), "2 h 02 min");
         assert_eq!(duration_text(f64::NAN), "?");

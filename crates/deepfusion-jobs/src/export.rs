@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn another_answer_is_an_error_that_names_the_deviation() {
+    fn another_result_is_an_error_that_names_the_deviation() {
         let maps = |depth: f32| {
             [DepthMaps {
                 depth: vec![10.0, depth],

@@ -242,13 +242,13 @@ mod tests {
     }
 
     #[test]
-    fn numbers_in_names_count_by_their_values() {
+    fn numbers_in_names_are_ordered_by_value() {
         let given = ["a/frame_10.png", "a/frame_1.png", "a/frame_2.png"];
         assert_eq!(names(&given), ["frame_1", "frame_2", "frame_10"]);
     }
 
     #[test]
-    fn an_image_given_twice_is_one() {
+    fn an_image_given_twice_counts_once() {
         let absolute = std::path::absolute("a/0.png").unwrap();
         let twice = ["./a/0.png", "a/0.png", absolute.to_str().unwrap()];
         assert_eq!(names(&twice), ["0"]);
@@ -300,7 +300,7 @@ mod tests {
 
     /// A `dataset.toml` for several folders applies here as in training: otherwise the same drive would have other metres.
     #[test]
-    fn settings_for_folders_make_one_a_recording() {
+    fn a_folder_with_settings_above_it_is_a_recording() {
         let root = tempfile::tempdir().unwrap();
         let drive = root.path().join("drive");
         std::fs::create_dir(&drive).unwrap();
@@ -320,7 +320,7 @@ mod tests {
 
     /// A comma2k19 segment has a preview image beside its video.
     #[test]
-    fn a_picture_beside_a_recording_is_no_input() {
+    fn a_picture_beside_a_recording_is_not_an_input() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         std::fs::write(at.join("preview.png"), []).unwrap();

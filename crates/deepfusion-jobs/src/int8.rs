@@ -216,7 +216,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn images_are_taken_from_all_over() {
+    fn images_are_spread_evenly() {
         let all: Vec<usize> = (0..10).collect();
         let of = |most| spread(&all, most).copied().collect::<Vec<_>>();
         assert_eq!(of(3), [0, 3, 6]);
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn deviation_is_that_of_logarithms() {
+    fn deviation_is_between_logarithms() {
         let off = mean_deviation(&[1.0, 2.0], &[1.0, 1.0]);
         assert!((off - 2_f64.ln() / 2.0).abs() < 1e-12, "{off}");
     }

@@ -18,7 +18,7 @@ const FILE: &str = "uncertainty.toml";
 const STEP: &str = "step";
 
 /// The contents of a run's file: the factors, and the step of the network that they were measured for.
-fn kept(run: &Path) -> Result<Option<(IntervalFactors, Option<usize>)>> {
+fn saved(run: &Path) -> Result<Option<(IntervalFactors, Option<usize>)>> {
     let path = run.join(FILE);
     let text = match std::fs::read_to_string(&path) {
         Ok(text) => text,
@@ -40,8 +40,8 @@ fn kept(run: &Path) -> Result<Option<(IntervalFactors, Option<usize>)>> {
 /// # Errors
 /// A file without factors.
 pub fn read(run: &Path, step: usize) -> Result<Option<IntervalFactors>> {
-    let kept = kept(run)?.filter(|(_, found)| *found == Some(step));
-    Ok(kept.map(|(factors, _)| factors))
+    let saved = saved(run)?.filter(|(_, found)| *found == Some(step));
+    Ok(saved.map(|(factors, _)| factors))
 }
 
 /// The factors beside a run, if they were measured at another step of the network.
@@ -49,8 +49,8 @@ pub fn read(run: &Path, step: usize) -> Result<Option<IntervalFactors>> {
 /// # Errors
 /// As [`read`].
 pub fn stale(run: &Path, step: usize) -> Result<Option<StaleCalibration>> {
-    let kept = kept(run)?.filter(|(_, found)| *found != Some(step));
-    Ok(kept.map(|(_, found)| StaleCalibration {
+    let saved = saved(run)?.filter(|(_, found)| *found != Some(step));
+    Ok(saved.map(|(_, found)| StaleCalibration {
         path: run.join(FILE),
         found,
         step,

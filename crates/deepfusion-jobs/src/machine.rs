@@ -202,7 +202,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_process_had_some_memory_and_no_more_than_there_is() {
+    fn peak_memory_is_positive_and_at_most_the_total() {
         let peak = peak_rss_mb().unwrap();
         let total = Memory::now().total_mb.unwrap();
         assert!(peak > 1.0 && peak < total as f64, "{peak} of {total}");
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_that_is_not_there_is_none() {
+    fn a_missing_program_is_not_found() {
         let why = version_of("no-such-program-anywhere").unwrap_err();
         assert!(matches!(why, NoProgram::NotFound), "{why}");
         assert_eq!(why.to_string(), "not on the PATH");

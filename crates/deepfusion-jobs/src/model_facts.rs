@@ -13,8 +13,8 @@ use crate::{Error, Result, StaleCalibration, intervals};
 /// The last part of a path, for people; for `.`, the folder's own name.
 #[must_use]
 pub fn name_of(path: &Path) -> String {
-    let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let name = whole.file_name().unwrap_or(whole.as_os_str());
+    let resolved = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let name = resolved.file_name().unwrap_or(resolved.as_os_str());
     name.to_string_lossy().into_owned()
 }
 

@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn another_focal_length_is_said_as_a_ratio() {
+    fn another_focal_length_is_reported_as_a_ratio() {
         let warning = OdometryWarning::OtherFocalLength {
             drive: "park".into(),
             ratio: 1.234,

@@ -108,7 +108,7 @@ fn unaimed_rigs(datasets: &[Dataset], is_such: impl Fn(&Dataset) -> bool) -> Vec
     rigs
 }
 
-/// Aims the cameras of a rig by the images of the first one that show the heading.
+/// Aims the cameras of a rig by the first one whose images show the heading.
 fn aim(datasets: &mut [Dataset], rig: &[usize], heading: impl Fn(&Dataset) -> Option<Heading>) {
     let seen = rig.iter().find_map(|i| {
         let dataset = &datasets[*i];
@@ -395,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn a_topic_that_is_none_is_named() {
+    fn an_invalid_topic_is_named() {
         let error = named_topics(&["/camera".to_owned()]).unwrap_err();
         assert_eq!(
             error.to_string(),
@@ -410,7 +410,7 @@ mod tests {
         (ahead.x, ahead.y)
     }
 
-    fn said(drive: &Dataset) -> String {
+    fn warning_text(drive: &Dataset) -> String {
         let warnings = drive.warnings().iter();
         warnings
             .map(ToString::to_string)
@@ -424,7 +424,7 @@ mod tests {
         let folder = folder(at.path())?;
         let options = OpenOptions::default();
         let taken = &open_recordings(std::slice::from_ref(&folder), &options)?[0];
-        assert!(taken.mount_assumed() && said(taken).contains("straight"));
+        assert!(taken.mount_assumed() && warning_text(taken).contains("straight"));
         let straight = |(right, down): (f64, f64)| right.abs() < 1e-9 && down.abs() < 1e-9;
         assert!(straight(ahead(taken)));
 
@@ -437,10 +437,10 @@ mod tests {
         );
         assert!((down + off.sin()).abs() < 0.008 && right.abs() < 0.008);
         assert!(!aimed.mount_assumed());
-        let said = said(aimed);
+        let warning_text = warning_text(aimed);
         assert!(
-            said.contains("degrees down") && !said.contains("straight ahead"),
-            "{said}"
+            warning_text.contains("degrees down") && !warning_text.contains("straight ahead"),
+            "{warning_text}"
         );
 
         // A given mount is used as it is.
@@ -453,7 +453,7 @@ mod tests {
 
     /// If each were turned by itself, the errors would make two cameras diverge, and they would no longer be a stereo pair.
     #[test]
-    fn two_cameras_of_a_drive_are_aimed_as_one() -> std::result::Result<(), Box<dyn Error>> {
+    fn two_cameras_of_a_drive_are_aimed_together() -> std::result::Result<(), Box<dyn Error>> {
         let at = tempfile::tempdir()?;
         let simulation = Simulation::new(&SimConfig {
             stereo_baseline_m: 0.5,
@@ -486,14 +486,14 @@ mod tests {
         let turned =
             taken[0].cam_from_vehicle().unwrap().inverse() * aimed[0].cam_from_vehicle().unwrap();
         assert!(turned.angle() > 1e-5, "nothing was found");
-        assert_eq!(said(&aimed[0]), said(&aimed[1]));
+        assert_eq!(warning_text(&aimed[0]), warning_text(&aimed[1]));
         Ok(())
     }
 
     /// For a drive with only a speed, the images show its turns and its camera's heading; with `measured_turns_only`, nothing is taken from
     /// them.
     #[test]
-    fn a_speed_is_enough() -> std::result::Result<(), Box<dyn Error>> {
+    fn turns_and_heading_are_found_with_only_a_speed() -> std::result::Result<(), Box<dyn Error>> {
         let at = tempfile::tempdir()?;
         let folder = folder(at.path())?;
         let speeds = fs::read_to_string(folder.join("speed.csv"))?;

@@ -120,7 +120,7 @@ impl<'a> TargetFinder<'a> {
         if let Some(factor) = self.watch.correction() {
             prediction.scale_depth(factor);
         }
-        if !motion.goes_on {
+        if !motion.continues {
             self.perception.reset();
         }
         let whole = prediction.depth();

@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_is_written_as_scripts_read_it_and_read_back() {
+    fn the_json_of_a_frame_is_fixed_and_can_be_read_back() {
         let record = FrameRecord {
             frame: "0000000005".into(),
             time_s: Some(0.5),
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_takes_its_default() {
+    fn missing_fields_take_their_defaults() {
         let text =
             r#"{"targets": [], "camera_motion": [0, 0, 1, 7, 0, 1, 0, 8, -1, 0, 0, 9], "new": 1}"#;
         let record: FrameRecord = serde_json::from_str(text).unwrap();

@@ -38,7 +38,7 @@ pub struct MadeWith {
     /// Of which predictions of an image the mean is taken (test-time augmentation); absent: only one prediction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub post_process: Option<PostProcess>,
-    /// The training data set whose metres are meant, if there were several.
+    /// The training data set whose metric scale is used, if there were several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub set: Option<String>,
     /// The topics chosen for bags: `image=/left`.
@@ -61,7 +61,7 @@ pub enum Difference {
     Engine,
     /// The kinds of outputs.
     Save,
-    /// The training data set whose metres are meant.
+    /// The training data set whose metric scale is used.
     Set,
     /// Largest depth of the points in clouds.
     MaxDepth,

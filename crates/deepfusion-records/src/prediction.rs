@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sidecar_is_written_as_scripts_read_it_and_read_back() {
+    fn the_json_of_a_sidecar_is_fixed_and_can_be_read_back() {
         let text = serde_json::to_string(&sidecar()).unwrap();
         assert_eq!(
             text,
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_can_be_shown_and_is_no_sidecar() {
+    fn an_incomplete_record_can_be_read_but_is_not_a_sidecar() {
         let text = r#"{"image": "x.png", "size": [4, 2], "scale_trusted": true}"#;
         let shown: PredictionRecord = serde_json::from_str(text).unwrap();
         assert_eq!((shown.size, shown.intrinsics), (Some([4, 2]), None));

@@ -40,7 +40,7 @@ impl DepthFile {
     /// Reads `NAME_depth.png` or `NAME_depth.npy`.
     ///
     /// # Errors
-    /// [`Error::Picture`] for a PNG that is cut off or not 16-bit grey, [`Error::Content`] for an array that is cut off, of
+    /// [`Error::Picture`] for a PNG that is truncated or not 16-bit grey, [`Error::Content`] for an array that is truncated, of
     /// another type than `f32` or `f64` or not two-dimensional, [`Error::File`] if reading fails.
     pub fn read(path: &Path) -> Result<Self> {
         if path.extension().is_some_and(|e| e == "npy") {

@@ -75,7 +75,7 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// The content of a file does not match its name.
@@ -92,15 +92,15 @@ pub enum Error {
     /// Another program listens on the port.
     #[error("{address}: the port is in use")]
     PortInUse {
-        /// Where the server was to listen.
+        /// The address that the server should listen on.
         address: SocketAddr,
     },
     /// The server cannot listen on the address.
     #[error("{address}: cannot listen on this address: {source}")]
     Listen {
-        /// Where the server was to listen.
+        /// The address that the server should listen on.
         address: SocketAddr,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
 }

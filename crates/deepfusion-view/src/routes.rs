@@ -93,7 +93,7 @@ impl Routes {
     }
 }
 
-/// What the page asks for first.
+/// The first answer to the page: colours, runs and version.
 #[derive(Debug, Serialize)]
 struct Session {
     colours: Colours,

@@ -456,8 +456,8 @@ fn a_run_shows_its_curve_and_panels() {
         ) && error.hint().is_some(),
         "{error}"
     );
-    let said = "contains predictions, which cannot be shown beside a training run";
-    assert!(error.to_string().ends_with(said), "{error}");
+    let expected = "contains predictions, which cannot be shown beside a training run";
+    assert!(error.to_string().ends_with(expected), "{error}");
 }
 
 /// Resident memory of this process in MiB; `None` if the system does not report it.

@@ -86,10 +86,10 @@ def _doctor(path: str) -> Row:
 
 def _inspect(path: str) -> Row:
     command = [sys.executable, "-m", "deepfusion", "data", "inspect", path, "--json"]
-    said = subprocess.run(command, capture_output=True, text=True, check=False)
-    if said.returncode != 0:
-        raise deepfusion.DeepFusionError(said.stderr.strip())
-    report = json.loads(said.stdout)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise deepfusion.DeepFusionError(done.stderr.strip())
+    report = json.loads(done.stdout)
     return {
         "layout": report["kind"],
         "drives": len(report.get("drives", [])),

@@ -181,7 +181,7 @@ class _Worker:
         }
 
     def there(self, url: str, name: str, mark: dict[str, Any]) -> tuple[str, str] | None:
-        """What the folder has of an image: `done` if this job made it before a worker died, `kept` if an earlier job did, `failed` if it
+        """The state of an image in the folder: `done` if this job made it before a worker died, `kept` if an earlier job did, `failed` if it
         belongs to something else, None if it is not complete."""
         written = self.folder.read(f"{name}.json")
         if written is None:

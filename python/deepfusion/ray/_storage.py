@@ -31,7 +31,7 @@ _MOST_BESIDE = 64 << 20
 
 
 def is_local(fs: Any) -> bool:
-    """Whether it is in the machine's own file tree (mounts included)."""
+    """Whether a file system is the machine's own file tree (mounts included)."""
     return "file" in _protocols(fs)
 
 
@@ -196,7 +196,7 @@ def urls(given: str | PathLike[str] | Sequence[str | PathLike[str]]) -> list[str
 
 def network(given: str | PathLike[str]) -> str:
     """A network as every worker finds it: the name of an embedded one, a URL, or an absolute path. A folder with an embedded network's
-    name is meant if it holds a run, or the remains of one, as in `deepfusion.load`."""
+    name takes precedence if it contains a run, even an incomplete one, as in `deepfusion.load`."""
     given = os.fspath(given)
     if given.rstrip("/") in deepfusion.networks() and not _holds_a_run(given):
         return given.rstrip("/")

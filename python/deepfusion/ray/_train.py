@@ -20,16 +20,16 @@ from ._storage import start, urls
 _LAST, _BEST = "last.safetensors", "best.safetensors"
 """A run's checkpoints."""
 _FIGURES = "ray-train.json"
-"""What the run came to, in its folder."""
+"""Name of the file with the results in the run's folder."""
 
 _ASIDE = r"\.\d+-[0-9a-f]{16}\.partial"
-"""How the name of a file ends that was being written; it begins with a dot."""
+"""Ending of the name of a temporary file, which begins with a dot."""
 _BEGUN = re.compile(
     rf"config\.toml|log\.csv|events\.out\.tfevents\..*\.deepfusion\..*|\.(config\.toml|log\.csv|(last|best)\.safetensors){_ASIDE}"
 )
 """The files of a run before its first checkpoint."""
 _PANEL = re.compile(rf"\d+\.png|\.\d+\.png{_ASIDE}")
-"""Those of its folder `panels`."""
+"""The files in its folder `panels`."""
 
 
 def train(
@@ -143,7 +143,7 @@ def _learn(arguments: dict[str, Any]) -> None:
 
 
 def _check_begun(out: Path, *more: str) -> None:
-    """That a folder without a last checkpoint holds nothing, or what a run leaves that died before its first one, and `more`."""
+    """Raises unless a folder without a last checkpoint has only files of a run that died before its first one, and `more`."""
     if not out.exists():
         return
     for file in out.iterdir():
@@ -158,7 +158,7 @@ def _check_begun(out: Path, *more: str) -> None:
 
 
 def _is_begun(file: Path) -> bool:
-    """Whether a file is one that a run writes before its first checkpoint, and not somebody's own of the name."""
+    """Whether a file was written by a run before its first checkpoint, and does not only have such a name."""
     if not _BEGUN.fullmatch(file.name):
         return False
     if file.name == "config.toml":

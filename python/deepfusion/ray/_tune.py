@@ -114,19 +114,19 @@ def ablate(
 
 
 def merged(*tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings over settings, each by its key with dots between tables: a table replaces those of its keys alone that it has."""
+    """Merges settings, each by its key with dots between tables: later tables replace only the keys that they have."""
     return {key: value for table in tables for key, value in _flat(table)}
 
 
 def lower(best: float | None, value: float) -> float | None:
-    """The lower of two; what is not finite is none, as NaN would stay for good."""
+    """The lower of two values. One that is not finite is ignored, since NaN would stay forever."""
     if not math.isfinite(value):
         return best
     return value if best is None else min(best, value)
 
 
 def best_first(trials: Sequence[Trial], metric: str, mode: str) -> list[Trial]:
-    """By what they reported last; those last that reported nothing, or nothing finite."""
+    """Trials sorted by their last report; those without a finite value come last."""
 
     def key(trial: Trial) -> tuple[bool, float]:
         value = trial.metrics.get(metric, math.nan)

@@ -34,7 +34,7 @@ pub(crate) struct ShowArgs {
     pub device: ComputeDevice,
 }
 
-/// Whose configuration is asked for.
+/// The source of the configuration to show.
 #[derive(Debug, Clone)]
 pub(crate) enum ConfigSource {
     Preset(Preset),

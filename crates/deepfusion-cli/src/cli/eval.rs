@@ -151,7 +151,7 @@ pub(crate) struct EvalArgs {
 }
 
 impl EvalArgs {
-    /// The protocol asked for; `default_crop` where none was.
+    /// The protocol that the options give, with `default_crop` unless `--crop` is given.
     pub(crate) fn protocol(&self, default_crop: Crop) -> Protocol {
         Protocol {
             crop: self.crop.unwrap_or(default_crop),

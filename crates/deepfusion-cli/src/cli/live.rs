@@ -13,7 +13,7 @@ pub(crate) struct LiveArgs {
     pub timeout: Option<f64>,
 }
 
-/// Where their options stand in the help.
+/// Heading of these options in the help.
 pub(super) const HEADING: &str = "Live sources";
 
 impl LiveArgs {

@@ -46,7 +46,7 @@ pub(crate) struct PerceiveArgs {
 }
 
 impl PerceiveArgs {
-    /// What is kept of the prediction that this stands on.
+    /// The outputs to write of the depth in which targets are found.
     pub(crate) fn outputs(&self, max_depth_m: f64) -> DepthOutputs {
         let limits = CloudLimits {
             max_depth_m,

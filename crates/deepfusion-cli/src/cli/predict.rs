@@ -54,7 +54,7 @@ pub(crate) struct PredictArgs {
 }
 
 impl PredictArgs {
-    /// What is kept of every image.
+    /// The outputs to write for every image.
     pub(crate) fn outputs(&self) -> DepthOutputs {
         let limits = CloudLimits {
             max_depth_m: self.max_depth,

@@ -25,7 +25,7 @@ pub(super) fn run(args: &AblateArgs) -> Result<()> {
     let (out, plan) = if args.resume {
         let out = args.out.clone().unwrap_or_default();
         let mut plan = Plan::read(&out)?;
-        plan.go_on_with(args.seeds.unwrap_or(0) as u64, &args.data);
+        plan.continue_with(args.seeds.unwrap_or(0) as u64, &args.data);
         (out, plan)
     } else {
         let plan = request(args)?.plan().map_err(in_options)?;
@@ -56,7 +56,7 @@ pub(super) fn run(args: &AblateArgs) -> Result<()> {
             ));
             results.push(match plan.run(&out, *row, config, seed)? {
                 Run::Done(result) => *result,
-                Run::Open(run) => made(*run, &plan, &out, args.device)?,
+                Run::Open(run) => train_and_evaluate(*run, &plan, &out, args.device)?,
             });
             plan.write_tables(&out, &results)?;
         }
@@ -113,7 +113,12 @@ fn in_options(error: deepfusion_jobs::Error) -> Failure {
 }
 
 /// Trains and evaluates one run, or continues it.
-fn made(run: OpenRun, plan: &Plan, out: &Path, device: ComputeDevice) -> Result<RunResult> {
+fn train_and_evaluate(
+    run: OpenRun,
+    plan: &Plan,
+    out: &Path,
+    device: ComputeDevice,
+) -> Result<RunResult> {
     let mut trainer = run.trainer(
         &devices::open(device)?,
         &mut print_warnings,

@@ -70,7 +70,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
     let Converted { paths, moved_s } = written;
     if moved_s > 0 {
         tracing::warn!(
-            "{}: some times are before 1970, which neither layout can represent: all times are written \
+            "{}: some times are not after the beginning of 1970, which neither layout can represent: all times are written \
              {moved_s} s later",
             args.input.display()
         );

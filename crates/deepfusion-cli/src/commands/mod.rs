@@ -44,7 +44,7 @@ mod weights;
 use crate::cli::{Command, ConfigCommand, DataCommand, WeightsCommand};
 use crate::failure::Result;
 
-/// Runs what was asked for.
+/// Runs a command; without one, prints the overview.
 pub(crate) fn run(command: Option<Command>) -> Result<()> {
     let Some(command) = command else {
         return overview::run();

@@ -12,7 +12,7 @@ use crate::failure::{Failure, Result, option_of};
 
 /// A run's configuration, changed as the options ask.
 pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> {
-    Ok(resume::go_on_with(run, &request(args)?)?)
+    Ok(resume::resumed_config(run, &request(args)?)?)
 }
 
 fn request(args: &TrainArgs) -> Result<ResumeRequest> {
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_of_a_recording_that_is_gone_names_its_option() {
+    fn the_error_of_a_missing_recording_names_its_option() {
         let mut config = a_run();
         config.data.validation = vec!["/data/val".into()];
         let explained = |path: &str| {

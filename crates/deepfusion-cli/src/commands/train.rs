@@ -23,8 +23,8 @@ use crate::{devices, interrupt, output};
 pub(super) fn run(args: &TrainArgs) -> Result<()> {
     let device = devices::open(args.device)?;
     let (mut trainer, _lock) = match &args.out {
-        Some(out) if args.resume => gone_on_with(out, args, &device)?,
-        _ => begun(args, &device)?,
+        Some(out) if args.resume => resumed_run(out, args, &device)?,
+        _ => new_run(args, &device)?,
     };
     say(&TrainingPlan::of(&trainer).to_string());
     if let Some(advice) = unused_turns(&trainer, args) {
@@ -49,7 +49,7 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
 }
 
 /// A new run. Errors of its start or its folder are reported before the recordings are opened, which may take long.
-fn begun(args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
+fn new_run(args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
     if let Some(out) = &args.out {
         output::require_run_folder(out)?;
     }
@@ -78,7 +78,7 @@ fn begun(args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
 }
 
 /// The run in a folder, to be continued. Its errors, too, are reported before the recordings are opened.
-fn gone_on_with(out: &Path, args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
+fn resumed_run(out: &Path, args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
     let (folder, _) = RunFolder::open(out)?;
     let lock = RunLock::take(folder.path())?;
     let run = folder.read_settings()?;

@@ -11,14 +11,14 @@ pub fn in_options(diagnosis: Diagnosis) -> Diagnosis {
         if let Some(words) = hint(&finding.what) {
             finding.hint = words;
         }
-        if let Some(words) = what(&finding.what) {
+        if let Some(words) = message(&finding.what) {
             finding.what = FindingReason::Words(words.to_owned());
         }
     })
 }
 
 /// What is wrong, for the findings whose text names options.
-fn what(reason: &FindingReason) -> Option<&'static str> {
+fn message(reason: &FindingReason) -> Option<&'static str> {
     match reason {
         FindingReason::Log(LogReason::NoTurns) => Some(
             "the turns of the vehicle are unknown: --view-motion vehicle cannot train, and --clock-offset auto has only changes of speed to compare",
@@ -86,7 +86,7 @@ mod tests {
     use deepfusion_logs::{ColumnProblem, NoGps, SignalProblem};
 
     #[test]
-    fn every_hint_that_an_option_does_names_it() {
+    fn hints_name_the_options_to_use() {
         let unreadable = |error: Error| LogReason::Unreadable(SharedError::from(error));
         let of_log = [
             LogReason::NoSpeed(NoGps::NoFix),

@@ -251,7 +251,7 @@ mod tests {
 
     #[cfg(feature = "train")]
     #[test]
-    fn a_setting_is_its_option() {
+    fn settings_are_reported_as_options() {
         let setting = Setting::ValidationSplit;
         let error = Failure::from(Error::BesideSets { setting });
         assert_eq!(
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn an_engine_that_refuses_another_size_has_the_hint_of_its_own_problem() {
+    fn an_engine_that_refuses_another_size_keeps_its_own_hint() {
         use deepfusion_runtime::Error as RuntimeError;
         let hint =
             |problem: Error| Failure::from(RuntimeError::engine("other size", problem)).hint();

@@ -375,7 +375,7 @@ impl Reportable for deepfusion_model::Error {
     }
 }
 
-/// Where a key of the configuration is set.
+/// The hint how to set a key of the configuration.
 pub(crate) fn set_in_file(field: &str) -> String {
     format!("set `{field}` accordingly in the config file or with its option (see --help)")
 }

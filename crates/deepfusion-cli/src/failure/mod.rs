@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_stopped_is_neither_done_nor_failed() {
+    fn stopped_work_is_neither_done_nor_failed() {
         let go_on = String::new();
         let (step, steps) = (3, 9);
         let stopped = [

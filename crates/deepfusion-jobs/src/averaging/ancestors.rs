@@ -107,12 +107,12 @@ fn place_of(path: &Path) -> String {
         Some(end) if end == "safetensors" => path.parent().unwrap_or(path),
         _ => path,
     };
-    let whole = folder
+    let resolved = folder
         .canonicalize()
         .or_else(|_| std::path::absolute(folder));
-    let whole = whole.unwrap_or_else(|_| folder.to_owned());
+    let resolved = resolved.unwrap_or_else(|_| folder.to_owned());
     // Removes a slash at the end.
-    whole
+    resolved
         .components()
         .collect::<PathBuf>()
         .display()

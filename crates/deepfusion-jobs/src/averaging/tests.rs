@@ -47,7 +47,7 @@ const LAST: CheckpointKind = CheckpointKind::Last;
 const LAYERS: [(&str, &[f32]); 1] = [("depth.a", &[1.0, 2.0])];
 
 #[test]
-fn depth_is_the_mean_and_the_rest_the_firsts() {
+fn depth_is_averaged_and_the_rest_is_from_the_first_network() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
     let tensors: [(&str, &[f32]); 3] = [
@@ -93,7 +93,7 @@ fn depth_is_the_mean_and_the_rest_the_firsts() {
 
 /// The mean of the variances leaves out how far apart the means are: 1 beside a variance of 2 in the first channel, nothing in the second.
 #[test]
-fn statistics_that_differ_are_said_and_averaged_as_they_are() {
+fn differing_statistics_are_reported_and_averaged() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
     let with = |name: &str, mean: [f32; 2], variance: [f32; 2]| {
@@ -135,7 +135,7 @@ fn shares_are_positive_and_one_for_each() {
 
 /// The weights of one seed, of another seed, of another network, and a run of which only the name is left.
 #[test]
-fn relatives_are_told_from_strangers() {
+fn related_networks_are_recognised() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
     let from = |name: &str, init: Option<&str>, seed: u64| {
@@ -190,7 +190,7 @@ fn relatives_are_told_from_strangers() {
 
 /// The uncertainty head stays if all have it, and is dropped if one has not: it depends on the other layers' features.
 #[test]
-fn the_head_for_uncertainty_is_everyones_or_no_ones() {
+fn the_uncertainty_head_is_kept_only_if_all_have_it() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
     let sure: [(&str, &[f32]); 2] = [("depth.a", &[1.0, 2.0]), ("depth.uncertainty.bias", &[4.0])];
@@ -216,7 +216,7 @@ fn the_head_for_uncertainty_is_everyones_or_no_ones() {
 }
 
 #[test]
-fn what_means_something_else_is_refused() {
+fn weights_with_another_meaning_are_refused() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
     let seen_by = |fy: f64| {

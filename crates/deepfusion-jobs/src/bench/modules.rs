@@ -25,7 +25,7 @@ impl ModuleCosts {
 
     /// The sum over the depth network.
     #[must_use]
-    pub fn whole(&self) -> ModuleCost {
+    pub fn depth_network(&self) -> ModuleCost {
         ModuleCost::sum("depth network", &self.depth)
     }
 
@@ -75,7 +75,7 @@ impl fmt::Display for ModuleCosts {
             "module", "M params", "G mult-adds", "weights MB", "values MB"
         )?;
         let parts = self.depth.iter().cloned();
-        let rows = parts.chain([self.whole(), self.pose.clone()]);
+        let rows = parts.chain([self.depth_network(), self.pose.clone()]);
         for row in rows {
             writeln!(
                 f,
@@ -97,7 +97,7 @@ mod tests {
     use deepfusion_model::Preset;
 
     #[test]
-    fn the_papers_parts_are_all_there_and_add_up() {
+    fn the_papers_parts_are_complete_and_add_up() {
         let modules = ModuleCosts::new(&Preset::Paper.config());
         let table = modules.to_string();
         for part in [
@@ -117,17 +117,17 @@ mod tests {
         ] {
             assert!(table.contains(part), "{table}");
         }
-        let whole = modules.whole();
+        let total = modules.depth_network();
         let all: Vec<_> = modules.all().collect();
         let (pose, depth) = all.split_last().unwrap();
         assert_eq!(pose.name, "pose_net");
         assert_eq!(
             depth.iter().map(|m| m.parameters).sum::<u64>(),
-            whole.parameters
+            total.parameters
         );
         assert_eq!(
             depth.iter().map(|m| m.multiply_adds).sum::<u64>(),
-            whole.multiply_adds
+            total.multiply_adds
         );
     }
 }

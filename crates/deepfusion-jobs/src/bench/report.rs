@@ -69,7 +69,7 @@ impl BenchRequest<'_> {
     pub fn measure(self, runner: &mut dyn DepthRunner) -> Result<BenchReport> {
         let (config, repeats) = (self.config, self.repeats.max(1));
         let modules = ModuleCosts::new(config);
-        let whole = modules.whole();
+        let depth = modules.depth_network();
         let bench = StreetBench::new(config)?;
         let stages = bench.stages(runner, repeats)?;
         let profile_ms = if self.profile {
@@ -82,8 +82,8 @@ impl BenchRequest<'_> {
             device: self.device.to_owned(),
             network: self.network.to_owned(),
             size: [config.size.width, config.size.height],
-            parameters: whole.parameters,
-            multiply_adds: whole.multiply_adds,
+            parameters: depth.parameters,
+            multiply_adds: depth.multiply_adds,
             modules,
             latency_ms: stages.sum(),
             fps: bench.overlapped_fps(runner, repeats)?,

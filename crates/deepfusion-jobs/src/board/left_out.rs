@@ -57,9 +57,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reason_is_written_in_words() {
+    fn reasons_are_serialised_as_text() {
         let (columns, rows) = (11, 6);
-        for (why, said) in [
+        for (why, expected) in [
             (LeftOutReason::NoBoard, "no board"),
             (LeftOutReason::OtherGrid { columns, rows }, "a grid of 11x6"),
             (
@@ -72,7 +72,10 @@ mod tests {
         ] {
             let name = "a.png".to_owned();
             let written = serde_json::to_value(LeftOut { name, why }).unwrap();
-            assert_eq!(written, serde_json::json!({"name": "a.png", "why": said}));
+            assert_eq!(
+                written,
+                serde_json::json!({"name": "a.png", "why": expected})
+            );
         }
     }
 }

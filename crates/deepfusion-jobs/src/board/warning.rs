@@ -63,13 +63,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_warning_is_said_in_words() {
+    fn warnings_have_the_expected_text() {
         let few = CalibrationWarning::FewViews {
             used: 6,
             enough: 10,
         };
         let (orientation, size) = (6, (480, 640));
-        for (warning, said) in [
+        for (warning, expected) in [
             (
                 BoardWarning::from(few),
                 "only 6 views: 10 to 30, from many sides, are better",
@@ -87,12 +87,12 @@ mod tests {
                 "images cannot be corrected with this lens: the distortion folds over within the image: it does not fit this camera matrix; show the board closer to the border of the image",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), expected);
         }
     }
 
     #[test]
-    fn only_squares_that_nobody_prints_are_warned_of() {
+    fn only_implausibly_large_squares_give_a_warning() {
         let warned = |side: Option<f64>| {
             let board = Board::new(9, 6, side).unwrap();
             BoardWarning::of_squares(&board).is_some()

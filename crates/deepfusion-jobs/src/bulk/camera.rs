@@ -257,12 +257,12 @@ impl LensFile {
             None => {
                 let calibration = CameraCalibration::read(&self.path, size)?;
                 let k = &calibration.intrinsics;
-                let said = (k.width, k.height);
+                let calibrated = (k.width, k.height);
                 // A lens takes memory for each pixel, so none is made for a size that no image has.
-                if said != size {
-                    return Err(other_size(said));
+                if calibrated != size {
+                    return Err(other_size(calibrated));
                 }
-                let made = (said, calibration.lens()?);
+                let made = (calibrated, calibration.lens()?);
                 // If another thread was first, it made the same lens.
                 self.lens.get_or_init(|| made)
             }
@@ -302,7 +302,7 @@ mod tests {
 
     /// An image of the training camera's size gets that camera, whatever the shape of its pixels; an upright image gets it turned.
     #[test]
-    fn the_training_cameras_own_images_have_its_numbers() {
+    fn images_of_the_training_camera_have_its_intrinsics() {
         let k = Intrinsics {
             fx: 703.64,
             fy: 724.82,
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_calibration_may_say_the_size_of_its_images() {
+    fn a_calibration_may_contain_the_size_of_its_images() {
         let folder = tempfile::tempdir().unwrap();
         let size_of = |name: &str, text: &str| {
             let path = folder.path().join(name);
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_given_comes_before_what_the_network_knows() {
+    fn a_given_camera_precedes_the_networks_own() {
         let trained = Some(Intrinsics::centred(900.0, (1280, 1024)));
         let chosen = |given: Option<GivenCamera>, trained, learned| {
             CameraSource::chosen(given.as_ref(), trained, learned)

@@ -26,7 +26,7 @@ pub struct DepthSettings {
     pub scale: ScaleMonitorConfig,
     /// Whether depth is corrected if its scale has drifted.
     pub correct_scale: bool,
-    /// The training data set whose metres are meant, if there were several.
+    /// The training data set whose metric scale is used, if there were several.
     pub set: Option<String>,
     /// The topics chosen for bags.
     pub topics: Vec<NamedTopic>,

@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_far_from_the_input_is_told_from_what_is_not() {
+    fn images_far_from_the_input_fit_poorly() {
         // The limits: 4:3 is just close enough to 10:3, and so is a quarter of the size.
         for size in [(1242, 375), (640, 480), (80, 24), (1000, 120)] {
             assert_eq!(fit(&NETWORK, size), None, "{size:?}");
@@ -162,7 +162,7 @@ mod tests {
     /// For a network trained with one camera: images of that camera fit, whatever the shape of the input. Other shapes are cropped to it,
     /// and what is left may be tiny.
     #[test]
-    fn what_a_network_learned_from_fits() {
+    fn images_of_the_training_camera_fit() {
         let own = Preparer {
             size: InputSize {
                 width: 640,
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_network_of_many_cameras_takes_an_input_that_fits() {
+    fn a_network_of_many_cameras_fits_many_shapes() {
         let many = Preparer {
             training_camera: Some(Intrinsics::centred(230.0, (320, 96))),
             canonical_focal_px: Some(185.0),

@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_with_other_shards_are_seen_at_work() {
+    fn locks_of_runs_with_other_shards_are_seen() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         let held = |count| Lock::is_held_by_others(at, count);

@@ -3,8 +3,8 @@
 
 use crossbeam_channel::bounded;
 
-/// How many items may wait for the next stage, per thread of that stage: enough to even out slow items, few enough that memory does not
-/// grow with the number of items.
+/// How many items may wait before and after the middle stage, per thread that makes or takes them: enough to even out slow items, few
+/// enough that memory does not grow with the number of items.
 const WAITING_PER_THREAD: usize = 2;
 
 /// Number of threads before and after the middle stage.
@@ -70,7 +70,7 @@ pub fn run<P: Send, O: Send>(
                 }
             });
         }
-        // The threads hold clones: their loops end when the senders are dropped.
+        // The threads of the last stage hold clones; their loops end when `to_after` is dropped.
         drop(computed);
         for item in 0..items {
             // A thread that ends early was told to stop.
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_computed_before_the_stop_is_finished() {
+    fn items_computed_before_the_stop_are_finished() {
         let (computed, finished) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let stop = || computed.load(Ordering::SeqCst) >= 5;
         run(

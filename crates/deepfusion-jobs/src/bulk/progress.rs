@@ -178,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_takes_long_to_write_is_written_less_often() {
+    fn a_slowly_written_manifest_is_written_less_often() {
         let pause = |ms| pause_after(Duration::from_millis(ms));
         assert_eq!(pause(3), WRITE_EVERY);
         assert_eq!(pause(2000), Duration::from_secs(40));

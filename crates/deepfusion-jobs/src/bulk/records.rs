@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_seen_as_they_come_and_stay_once_finished() {
+    fn lines_are_visible_at_once_and_stay_when_finished() {
         let folder = tempfile::tempdir().unwrap();
         let path = record_lines_path(folder.path());
         let growing = folder.path().join("targets.jsonl.partial");
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_line_nothing_is_left() {
+    fn a_file_without_lines_is_removed() {
         let folder = tempfile::tempdir().unwrap();
         let path = record_lines_path(folder.path());
         RecordLines::begin(&path).unwrap().discard();

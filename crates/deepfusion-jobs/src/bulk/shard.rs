@@ -87,7 +87,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn shards() {
+    fn shards_are_parsed() {
         assert_eq!("2/8".parse(), Ok(Shard { index: 2, count: 8 }));
         for bad in [
             "0/8", "9/8", "0/0", "1/0", "1", "a/b", "-1/2", "1/2/3", "1.5/2",
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_that_names_none_says_why() {
+    fn an_invalid_shard_says_why() {
         for (text, why) in [
             ("1", "expected I/N, the I-th of N shards, such as 2/8"),
             ("0/0", "expected I/N, the I-th of N shards, such as 2/8"),
@@ -114,7 +114,7 @@ mod tests {
     proptest! {
         /// Every item is in exactly one shard, and no shard is larger than another by more than one.
         #[test]
-        fn shards_partition(items in 0usize..200, count in 1usize..20) {
+        fn shards_partition_the_items(items in 0usize..200, count in 1usize..20) {
             let all: Vec<usize> = (0..items).collect();
             let shards = (1..=count).map(|index| {
                 Shard { index, count }.select(&all).copied().collect::<Vec<_>>()

@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_median_is_that_of_the_frames_that_are_done() {
+    fn the_median_latency_is_over_finished_frames() {
         let mut summary = TargetSummary::<Error>::new(4);
         assert_eq!(summary.median_latency_ms(), None);
         summary.latency_ms = vec![90.0, 12.0, 31.0];

@@ -98,7 +98,7 @@ fn depth_of_all(folder: &Path, all: &[Input]) -> (Summary<Error>, Vec<ImageWarni
 }
 
 #[test]
-fn depth_is_made_once_and_warned_of_once() {
+fn depth_is_predicted_once_with_one_warning() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let (summary, warned) = depth_of(at, &["a", "b", "missing"]);
@@ -122,7 +122,7 @@ fn depth_is_made_once_and_warned_of_once() {
 
 /// Depth of a picture of depth is meaningless, but a saved copy of the image is a valid input.
 #[test]
-fn outputs_are_no_inputs_wherever_they_lie() {
+fn outputs_are_not_inputs_in_any_folder() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let (model, mut estimator) = network();
@@ -157,7 +157,7 @@ fn outputs_are_no_inputs_wherever_they_lie() {
 
 /// The depth of another camera beside a new sidecar would be taken for that of the new camera.
 #[test]
-fn what_is_overwritten_leaves_nothing_of_its_own() {
+fn overwriting_removes_earlier_outputs() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     depth_of(at, &["a", "b"]);
@@ -201,7 +201,7 @@ fn what_is_overwritten_leaves_nothing_of_its_own() {
 /// File names are bytes on Unix, but JSON is text.
 #[cfg(target_os = "linux")]
 #[test]
-fn an_image_whose_name_is_no_text_fails_alone() {
+fn an_image_whose_name_is_not_utf_8_fails_alone() {
     use std::os::unix::ffi::OsStrExt;
 
     let folder = tempfile::tempdir().unwrap();
@@ -217,7 +217,10 @@ fn an_image_whose_name_is_no_text_fails_alone() {
     let [(1, error @ Error::NotText { .. })] = summary.failures.as_slice() else {
         panic!("{:?}", summary.failures);
     };
-    assert!(error.hint().unwrap().contains("rename it"), "{error}");
+    assert!(
+        error.hint().unwrap().contains("rename the image"),
+        "{error}"
+    );
 }
 
 /// Frames of a folder of images whose camera has this focal length.
@@ -237,7 +240,7 @@ fn frames(folder: &Path, focal_px: f64) -> Vec<Input> {
 
 /// A newly calibrated recording has other metres, and the scale monitor starts at the first frame.
 #[test]
-fn what_is_there_of_a_recording_stays_only_where_it_would_be_made_so_again() {
+fn outputs_of_a_recording_stay_only_if_they_would_be_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let drive = at.join("drive");
@@ -282,7 +285,7 @@ fn what_is_there_of_a_recording_stays_only_where_it_would_be_made_so_again() {
 
 /// A run with another number of shards is writing the same images.
 #[test]
-fn what_another_run_is_writing_stays() {
+fn files_that_another_run_is_writing_stay() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let (model, estimator) = network();
@@ -338,7 +341,7 @@ fn each_recording_begins_once() {
 
 /// Neither a job nor a frame saves pictures of layers if nothing shows the layers.
 #[test]
-fn pictures_of_layers_need_what_shows_them() {
+fn pictures_of_layers_need_a_function_that_shows_them() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let (model, mut estimator) = network();
@@ -416,7 +419,7 @@ fn targets_are_written_and_reported_in_order() {
 
 /// Pictures of another run's targets would be taken for those of the new ones.
 #[test]
-fn targets_that_are_overwritten_leave_no_pictures() {
+fn overwriting_targets_removes_their_pictures() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let out = at.join("out");
@@ -440,7 +443,7 @@ fn targets_that_are_overwritten_leave_no_pictures() {
 }
 
 #[test]
-fn a_run_ends_where_nothing_can_be_reported() {
+fn a_run_ends_if_reporting_fails() {
     let folder = tempfile::tempdir().unwrap();
     let summary = targets_of(folder.path(), |_| Err(Error::NoCamera));
     assert!(matches!(summary.stopped_by, Some(Error::NoCamera)));

@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn images_of_no_recording_are_one_video() {
+    fn images_without_a_recording_become_one_video() {
         let inputs = [image("a"), image("b")];
         let found = videos(&inputs);
         assert_eq!(found.len(), 1);

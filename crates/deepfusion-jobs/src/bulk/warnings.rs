@@ -124,7 +124,7 @@ mod tests {
     use deepfusion_records::FileMark;
 
     #[test]
-    fn each_kind_is_given_once() {
+    fn each_kind_of_warning_is_reported_once() {
         let given = Mutex::new(Vec::new());
         let warn = |warning: ImageWarning| given.lock().unwrap().push(warning);
         let warnings = Warnings::new(&warn);

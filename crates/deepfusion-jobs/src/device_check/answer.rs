@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_infinite_comes_back_as_wrong_and_a_failure_with_its_words() {
+    fn infinite_errors_and_failures_are_read_back() {
         let failed = OperationCheck {
             operation: "warp",
             needed_by: NeededBy::Views,

@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_come_until_the_source_ends() {
+    fn lines_are_read_until_the_source_ends() {
         let (send, mut lines) = lines(Duration::from_secs(60));
         send.send(b"one\ntw").unwrap();
         assert_eq!(lines.next().as_deref(), Some("one"));

@@ -10,7 +10,7 @@ use crate::devices::ComputeDevice;
 pub struct DeviceCheckRecord {
     /// Name of the device.
     pub device: String,
-    /// Largest accepted error relative to the processor, over the largest value.
+    /// Largest accepted difference from the processor, relative to the largest value.
     pub tolerance: f64,
     /// Whether the ResNet presets predict the same depth as on the processor.
     pub predict: bool,
@@ -62,7 +62,7 @@ mod tests {
     use deepfusion_train::device_check::{NeededBy, OperationCheck, OperationFailure};
 
     #[test]
-    fn what_is_infinite_is_null() {
+    fn infinite_errors_are_null() {
         let failed = OperationCheck {
             operation: "any",
             needed_by: NeededBy::Flow,

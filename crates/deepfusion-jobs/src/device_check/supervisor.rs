@@ -183,7 +183,7 @@ mod tests {
     const PATIENT: Duration = Duration::from_secs(60);
 
     #[test]
-    fn another_process_goes_on_behind_the_operation_that_ended_one() {
+    fn a_new_process_continues_after_an_operation_that_crashed_one() {
         let (started, checked) = seen(&ASKED, PATIENT, |first| match first {
             "a" => format!("{}; exit 3", answer("a", None)),
             _ => answer("c", None),
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn another_process_goes_on_behind_one_that_says_that_it_failed() {
+    fn a_new_process_continues_after_a_reported_failure() {
         let (started, checked) = seen(&ASKED, PATIENT, |first| match first {
             "a" => answer("a", Some("out of memory")),
             _ => format!("{}; {}", answer("b", None), answer("c", None)),
@@ -207,14 +207,14 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_hangs_is_ended() {
+    fn a_process_that_hangs_is_killed() {
         let limit = Duration::from_millis(50);
         let (_, checked) = seen(&ASKED[..1], limit, |_| "exec sleep 600".into());
         assert_eq!(checked, [("a", Some(OperationFailure::Silent(limit)))]);
     }
 
     #[test]
-    fn who_is_told_may_stop_it_and_its_process_is_gone() {
+    fn a_cancelled_check_ends_its_process() {
         let folder = tempfile::tempdir().unwrap();
         let number = folder.path().join("process");
         let mut program = |_: &str| -> Result<Command> {
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_that_is_not_there_is_an_error() {
+    fn a_missing_program_is_an_error() {
         let mut program = |_: &str| -> Result<Command> { Ok(Command::new("/no/such/program")) };
         let mut report = |_: OperationCheck| -> Result<()> { Ok(()) };
         let failed = supervise(&ASKED, PATIENT, &mut program, &mut report);

@@ -47,7 +47,7 @@ impl Confidence {
     /// # Errors
     /// An invalid file.
     pub fn read(run: &Path, step: usize) -> Result<Option<Self>> {
-        Ok(Self::kept(run)?.filter(|kept| kept.step == Some(step)))
+        Ok(Self::saved(run)?.filter(|kept| kept.step == Some(step)))
     }
 
     /// The confidence beside a run, if it was learned at another step of the network.
@@ -55,7 +55,7 @@ impl Confidence {
     /// # Errors
     /// As [`Self::read`].
     pub fn stale(run: &Path, step: usize) -> Result<Option<StaleCalibration>> {
-        let kept = Self::kept(run)?.filter(|kept| kept.step != Some(step));
+        let kept = Self::saved(run)?.filter(|kept| kept.step != Some(step));
         Ok(kept.map(|kept| StaleCalibration {
             path: run.join(FILE),
             found: kept.step,
@@ -63,7 +63,7 @@ impl Confidence {
         }))
     }
 
-    fn kept(run: &Path) -> Result<Option<Self>> {
+    fn saved(run: &Path) -> Result<Option<Self>> {
         let path = run.join(FILE);
         match std::fs::read_to_string(&path) {
             Ok(text) => match toml::from_str(&text) {

@@ -169,7 +169,7 @@ mod tests {
 
     /// If a split lists both cameras and only one is opened, the message says so instead of reporting missing data.
     #[test]
-    fn frames_of_the_other_camera_are_said_to_be_its() {
+    fn frames_of_the_other_camera_are_reported_as_such() {
         let at = tempfile::tempdir().unwrap();
         let simulation = Simulation::new(&SimConfig {
             frames: 4,
@@ -197,9 +197,9 @@ mod tests {
         let datasets = Dataset::open(&root, &left).unwrap();
         let shortfall = missing_frames(&left, &datasets).unwrap();
         assert_eq!(shortfall.why, MissingReason::OtherCamera(2));
-        let said = shortfall.to_string();
+        let text = shortfall.to_string();
         let expected = "split.txt: found 1 of 3 frames (33.3 %); 2 belong to the other camera";
-        assert!(said.ends_with(expected), "{said}");
+        assert!(text.ends_with(expected), "{text}");
         let error = expected_frames(&left, &datasets, true).unwrap_err();
         assert!(error.hint().unwrap().contains("both cameras"), "{error}");
 

@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn of_several_drives_whole_ones_are_held_out() {
+    fn several_drives_are_divided_by_drive() {
         let images = images(&[("a", 0..30), ("b", 0..50), ("c", 0..15)]);
         let division = divide(&images);
         assert!(division.by_drive);
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn of_one_drive_a_part_is_held_out_that_no_learned_frame_is_next_to() {
+    fn one_drive_is_divided_with_a_gap() {
         // Both cameras: camera 3 after camera 2.
         let images = images(&[("a", 0..40), ("a", 0..40)]);
         let Division {
@@ -128,14 +128,14 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_too_small_to_judge_by_is_no_other_side() {
+    fn a_drive_too_small_to_test_on_is_not_held_out_alone() {
         let division = divide(&images(&[("a", 0..98), ("b", 0..2)]));
         assert!(!division.by_drive);
         assert!(division.held_out.len() > 40);
     }
 
     #[test]
-    fn few_images_are_divided_as_far_as_they_go() {
+    fn few_images_are_divided_as_far_as_possible() {
         for (n, sizes) in [
             (0, (0, 0)),
             (1, (1, 0)),

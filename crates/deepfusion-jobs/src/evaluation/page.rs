@@ -272,7 +272,7 @@ mod tests {
     use deepfusion_eval::{Evaluator, Grid, Prediction};
 
     #[test]
-    fn a_page_of_arrays_says_what_was_compared() {
+    fn the_page_of_arrays_names_the_compared_files() {
         let protocol = Protocol::default();
         let mut evaluator = Evaluator::new(protocol.clone()).unwrap();
         let depth = || Grid::new(2, 1, vec![10.0, 20.0]).unwrap();

@@ -26,7 +26,7 @@ pub struct EvaluationRequest<'a> {
     pub options: OpenOptions,
     /// The precision in which the network is computed.
     pub precision: Precision,
-    /// The training data set whose metres are meant, if there were several.
+    /// The training data set whose metric scale is used, if there were several.
     pub set: Option<&'a str>,
     /// The program that evaluates, with its version.
     pub program: String,

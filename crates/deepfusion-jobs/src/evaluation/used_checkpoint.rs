@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_a_run_the_choice_is_explained() {
+    fn the_choice_of_a_runs_checkpoint_is_explained() {
         let of_run = |name: &str, chosen| {
             let checkpoint = UsedCheckpoint {
                 name: name.into(),
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn a_packed_network_is_named_by_its_sum() {
+    fn a_packed_network_is_identified_by_its_checksum() {
         let packed = UsedCheckpoint {
             name: "street".into(),
             path: None,

@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_other_camera_of_a_pair_lies_beside_it() {
+    fn the_other_cameras_image_is_found_by_its_path() {
         let other = |path: &str| other_camera(Path::new(path));
         let left = "/kitti/image_02/2011_09_26_drive_0005_sync/image_02/data/0000000004.png";
         let right = "/kitti/image_02/2011_09_26_drive_0005_sync/image_03/data/0000000004.png";

@@ -146,7 +146,7 @@ mod tests {
     /// A run that starts from a depth network alone gets a new PoseNet, whose unit is determined by its data; a run that starts from both
     /// keeps the imported unit.
     #[test]
-    fn a_pose_net_that_the_files_lack_is_in_no_checkpoint() {
+    fn a_missing_pose_net_is_not_in_the_checkpoint() {
         let device = Device::flex();
         let at = tempfile::tempdir().unwrap();
         let mut depth_config = DepthNetConfig::monodepth2(deepfusion_nn::ResNetDepth::ResNet18);
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_networks_layers_say_its_preset() {
+    fn the_preset_follows_from_the_layers() {
         let all = Preset::ALL.into_iter();
         let family: Vec<Preset> = all.skip_while(|p| *p != Preset::Monodepth2).collect();
         assert_eq!(family.len(), 9);

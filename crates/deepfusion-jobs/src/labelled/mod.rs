@@ -95,7 +95,7 @@ impl TargetEvaluation {
                 continue;
             };
             let motion = motions.of(dataset, *index);
-            if !motion.goes_on {
+            if !motion.continues {
                 self.perception.reset();
             }
             if motion.stamp.is_none() {

@@ -215,7 +215,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_label_is_read_and_a_short_one_is_not() {
+    fn a_label_is_parsed_and_a_short_one_rejected() {
         let line =
             "Car 0.00 1 -1.57 599.41 156.40 629.75 189.25 2.85 2.63 12.34 0.47 1.49 69.44 -1.56";
         let (class, label) = parse(line, 3, &Vector3::new(0.06, 0.0, 0.0)).unwrap();

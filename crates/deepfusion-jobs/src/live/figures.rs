@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_median_is_that_of_the_frames() {
+    fn the_median_latency_is_over_all_frames() {
         let mut latencies = Latencies::new();
         assert_eq!(latencies.median_ms(), 0);
         for ms in [90_000.0, 12.2, 30.9, 12.7, 31.0] {

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_frames_make_room() {
+    fn only_outputs_of_frames_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         let frames = [

@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_computes_is_listed_by_name() {
+    fn devices_and_instruction_sets_are_listed_by_name() {
         let machine = serde_json::to_value(Machine::inspect()).unwrap();
         assert_eq!(machine["devices"][0], "cpu");
         let simd = machine["simd"].as_array().unwrap();

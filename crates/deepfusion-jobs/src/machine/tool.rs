@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tool_is_said_with_its_file_or_why_it_is_none() {
+    fn the_text_of_a_tool_has_its_file_or_the_reason() {
         let json = |tool: &Tool| serde_json::to_string(tool).unwrap();
         let library = Tool::Found {
             version: "1.31.1".into(),

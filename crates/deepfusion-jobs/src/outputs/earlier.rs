@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_is_as_it_was_written_is_removed() {
+    fn only_unchanged_files_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         let root = folder.path();
         let at = root.join("out");
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn targets_of_somebody_else_stay() {
+    fn targets_of_another_program_stay() {
         let folder = tempfile::tempdir().unwrap();
         let at = |file: &str| -> PathBuf { folder.path().join(file) };
         let image = input(folder.path(), "a.png");

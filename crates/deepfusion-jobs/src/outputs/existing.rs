@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_of_targets_are_no_inputs() {
+    fn pictures_of_targets_are_not_inputs() {
         let folder = tempfile::tempdir().unwrap();
         let at = |file: &str| folder.path().join(file);
         let input = |file: &str| Input {

@@ -282,7 +282,7 @@ mod tests {
 
     /// Images alone prove nothing: another simulator's have no exact poses either. The mark of `data convert` does.
     #[test]
-    fn what_anybody_may_have_written_is_not_known() {
+    fn the_origin_of_images_without_a_mark_is_unknown() {
         let at = tempfile::tempdir().unwrap();
         let at = at.path();
         let of = |recording: &Path| images_of(recording, None);
@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn an_embedded_network_says_it_itself() {
+    fn the_card_of_an_embedded_network_is_believed() {
         let mut config = Preset::Tiny.config();
         config.data = toml::from_str(
             "sets = [{ name = 'streets', learn = 'depth', simulated = { seed = 1 } }]",

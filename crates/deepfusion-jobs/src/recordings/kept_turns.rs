@@ -58,8 +58,8 @@ fn keep(file: &Path, turns: &[SeenTurn], origin: &Sum) -> io::Result<()> {
     deepfusion_fs::write(file, written(turns, origin))
 }
 
-/// The file for a recording's turns: one for each camera, before and after the camera is aimed. Two topics of a bag differ in their
-/// intrinsics: otherwise the turns of one would replace the other's.
+/// The file for a recording's turns: one for each camera, before and after the camera is aimed. The intrinsics are part of its name, since
+/// they distinguish two topics of a bag, whose turns would otherwise replace each other.
 fn file_of(dataset: &Dataset, folder: &Path) -> PathBuf {
     let recording = format!(
         "{:?} {} {:?} {:?} {}",
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_are_found_once_and_anew_for_anything_else() {
+    fn turns_are_measured_again_only_after_a_change() {
         let at = tempfile::tempdir().unwrap();
         let root = drive(at.path());
         let dataset = opened(&root);

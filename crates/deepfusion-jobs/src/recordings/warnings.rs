@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_several_recordings_have_in_common_is_one_line() {
+    fn a_warning_shared_by_recordings_is_one_line() {
         let of = |place: &str, warning: &str| (place.to_owned(), warning.to_owned());
         let warnings = [
             of("a.bag", "no mount"),

@@ -57,7 +57,7 @@ impl DepthWatch {
         }
         let (_, rays) = self.rays.as_ref()?;
         // The last ground is only a guess for this frame if the camera's motion continues.
-        let before = self.ground.take().filter(|_| motion.goes_on);
+        let before = self.ground.take().filter(|_| motion.continues);
         self.ground = Ground::find(&depth.data, rays, before.as_ref(), &self.config);
         let ground = self.ground.as_ref();
         self.watch.add(image, &camera, &motion, ground)

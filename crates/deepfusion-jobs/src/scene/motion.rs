@@ -24,7 +24,7 @@ pub struct Motion {
     /// The pose of this frame's camera in the last frame's camera, if this frame follows it.
     pub last_from_this: Option<Se3>,
     /// Whether this frame follows the last one, so that tracks continue.
-    pub goes_on: bool,
+    pub continues: bool,
     /// Whether this is the first frame, or the last frame belonged to another recording: what was learned from that does not apply.
     pub begins_recording: bool,
     /// The downward direction in the camera's axes, if the mount is known.
@@ -109,7 +109,7 @@ impl MotionTracker {
             yaw_rate: step.map_or(0.0, |(_, motion, dt)| yaw_rate(&motion, dt)),
             last_from_this: step.map(|(_, motion, _)| motion),
             seconds: step.map(|(.., dt)| dt),
-            goes_on: step.is_some(),
+            continues: step.is_some(),
             begins_recording,
             down_in_cam: dataset
                 .cam_from_vehicle()
@@ -144,7 +144,7 @@ impl StraightWay {
         let Some(speed) = self.speed_mps else {
             return Motion::default();
         };
-        let goes_on = self.first.is_some();
+        let continues = self.first.is_some();
         let first = *self.first.get_or_insert(arrived);
         let time_s = arrived.duration_since(first).as_secs_f64();
         let place = Vector3::z() * speed * time_s;
@@ -154,7 +154,7 @@ impl StraightWay {
                 world_from_cam: Se3::from_axis_angle(Vector3::zeros(), place),
             }),
             speed_mps: Some(speed),
-            goes_on,
+            continues,
             ..Motion::default()
         }
     }
@@ -166,7 +166,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn a_camera_that_looks_back_has_nothing_ahead() {
+    fn a_camera_that_looks_back_has_no_yaw() {
         let looking = |x: f64, z: f64| Motion {
             ahead_in_cam: Some(Vector3::new(x, 0.0, z)),
             ..Motion::default()
@@ -179,10 +179,10 @@ mod tests {
     }
 
     #[test]
-    fn a_given_speed_is_a_way_straight_ahead() {
+    fn a_given_speed_is_motion_straight_ahead() {
         let mut way = StraightWay::new(Some(8.0));
         let start = Instant::now();
-        assert!(!way.at(start).goes_on);
+        assert!(!way.at(start).continues);
         let motion = way.at(start + Duration::from_millis(250));
         let stamp = motion.stamp.unwrap();
         assert_eq!(stamp.time_s, 0.25);
@@ -191,11 +191,11 @@ mod tests {
             Vector3::new(0.0, 0.0, 2.0)
         );
         assert_eq!(motion.speed_mps, Some(8.0));
-        assert!(motion.goes_on);
+        assert!(motion.continues);
         let mut nowhere = StraightWay::new(None);
         for _ in 0..2 {
             let unknown = nowhere.at(start);
-            assert!(unknown.stamp.is_none() && unknown.speed_mps.is_none() && !unknown.goes_on);
+            assert!(unknown.stamp.is_none() && unknown.speed_mps.is_none() && !unknown.continues);
         }
     }
 }

@@ -107,7 +107,7 @@ impl ScaleWatch {
         motion: &Motion,
         ground: Option<&Ground>,
     ) -> Option<ScaleRecord> {
-        if !motion.goes_on {
+        if !motion.continues {
             self.monitor.pause();
             self.last = None;
         }
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_learned_of_a_recording_is_not_the_next_ones() {
+    fn the_scale_of_a_recording_does_not_apply_to_the_next() {
         let mut watch = ScaleWatch::new(ScaleMonitorConfig::default(), true);
         let camera = Intrinsics::centred(60.0, (96, 64));
         let first = Motion {

@@ -112,7 +112,7 @@ mod tests {
     use deepfusion_model::Preset;
 
     #[test]
-    fn what_is_asked_for_takes_the_place_of_what_is_there() {
+    fn requested_recordings_replace_the_configured_ones() {
         let mut data = Preset::Tiny.config().data;
         let none = AskedRecordings::default();
         let error = none.replace_in(&mut data).unwrap_err().to_string();
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn what_each_data_set_has_is_not_asked_for_beside_them() {
+    fn settings_of_data_sets_cannot_be_requested_separately() {
         let data = || -> DataConfig {
             toml::from_str("sets = [{ name = 'road', paths = ['road'], camera = '3' }]").unwrap()
         };

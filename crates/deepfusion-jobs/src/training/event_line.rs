@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_no_network_says_is_not_printed() {
+    fn values_that_no_network_predicts_are_not_printed() {
         let mut losses = LossTerms {
             reprojection: 0.125,
             speed: 0.25,
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_of_several_kinds_are_counted_apart() {
+    fn kinds_of_samples_are_counted_separately() {
         let started = |known_depth, simulated| {
             let event = TrainEvent::Started {
                 from_step: 0,
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_says_what_it_learned_and_how_long_it_will_take() {
+    fn the_line_of_a_step_has_its_losses_and_the_remaining_time() {
         let step = TrainEvent::Step {
             step: 3,
             steps: 40,

@@ -25,7 +25,7 @@ pub enum OtherMeaning {
     },
     /// Depth is refined from another initial depth.
     #[error(
-        "the weights to start from refine an initial depth of {}, but it is {} in this configuration (depth_net.initial_depth_m): they have to learn this again",
+        "the weights to start from refine depth from {}, but this configuration refines it from {} (depth_net.initial_depth_m): they have to learn this again",
         initial(*was),
         initial(*is)
     )]
@@ -114,18 +114,18 @@ mod tests {
     use deepfusion_model::Preset;
 
     #[test]
-    fn what_differs_is_said_where_depth_has_learned() {
+    fn differences_are_reported_if_depth_was_trained() {
         let theirs = Preset::RMsfm3.config();
         assert!(OtherMeaning::all(&theirs, &theirs, true).is_empty());
         let mut own = theirs.clone();
         own.depth_net.encoder.normalisation = InputNormalisation::Centred;
         own.depth_net.initial_depth_m = Some(33.0);
         own.depth_net.range.max_m = 60.0;
-        let said = |depth_learned| {
+        let warnings = |depth_learned| {
             let all = OtherMeaning::all(&theirs, &own, depth_learned);
             all.iter().map(ToString::to_string).collect::<Vec<_>>()
         };
-        let all = said(true);
+        let all = warnings(true);
         let [images, initial, range] = all.as_slice() else {
             panic!("{all:?}")
         };
@@ -134,10 +134,10 @@ mod tests {
             "{images}"
         );
         assert!(
-            initial.contains("it is 33 m in this configuration"),
+            initial.contains("this configuration refines it from 33 m"),
             "{initial}"
         );
         assert!(range.contains("to 60 m"), "{range}");
-        assert_eq!(said(false), std::slice::from_ref(images));
+        assert_eq!(warnings(false), std::slice::from_ref(images));
     }
 }

@@ -130,25 +130,25 @@ mod tests {
         let mut config = Preset::Tiny.config();
         (config.batch, config.accumulate) = (4, 2);
         (config.epochs, config.steps, config.min_steps) = (20, None, 1200);
-        let said = |config: &TrainConfig, epoch_steps| {
+        let printed = |config: &TrainConfig, epoch_steps| {
             let plan = TrainingPlan::new(config, epoch_steps).to_string();
             let (start, end) = plan.split_once(": images of ").unwrap();
             assert_eq!(start, "tiny");
             end.split_once(", ").unwrap().1.to_owned()
         };
         assert_eq!(
-            said(&config, 34),
+            printed(&config, 34),
             "8 of video per step, 1200 steps (the minimum; 20 epochs would be only 680)"
         );
-        assert_eq!(said(&config, 340), "8 of video per step, 20 epochs");
+        assert_eq!(printed(&config, 340), "8 of video per step, 20 epochs");
         config.steps = Some(1);
         config.data.learn = Learn::Both;
         config.depth_batch = 3;
         assert_eq!(
-            said(&config, 340),
+            printed(&config, 340),
             "8 of video and 6 of known depth per step, 1 step"
         );
         config.data.learn = Learn::Depth;
-        assert_eq!(said(&config, 340), "6 of known depth per step, 1 step");
+        assert_eq!(printed(&config, 340), "6 of known depth per step, 1 step");
     }
 }

@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn every_data_set_has_the_unit_of_the_run_that_had_none() {
+    fn data_sets_inherit_the_unit_of_a_run_without_data_sets() {
         let theirs = run(0.8, &[]);
         let mut config = run(0.0, &[("road", 0.0), ("garage", 0.1), ("streets", 0.0)]);
         config.data.sets[2].learn = Learn::Depth;
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_without_data_sets_has_the_unit_of_the_only_one() {
+    fn a_run_without_data_sets_inherits_the_only_unit() {
         let mut theirs = run(0.7, &[("drives", 1.2), ("streets", 1.0)]);
         theirs.data.sets[1].learn = Learn::Depth;
         assert_eq!(inherited(&theirs, run(0.0, &[])), (1.2, vec![]));
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn several_units_are_kept_by_name_and_else_said() {
+    fn several_units_are_kept_by_name_or_reported() {
         let theirs = run(0.7, &[("road", 1.2), ("garage", 0.1)]);
         let mut known = run(0.0, &[("garage", 0.0), ("road", 0.0)]);
         inherit(&theirs, &mut known);

@@ -82,7 +82,7 @@ pub enum ClockAhead {
 ///
 /// # Errors
 /// [`Error::Contradiction`]; an unknown term or key.
-pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainConfig> {
+pub fn resumed_config(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainConfig> {
     // Destructured, so that a new field cannot be forgotten here.
     let ResumeRequest {
         file,
@@ -429,7 +429,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_who_asks_for_fewer_steps_is_refused() {
+    fn only_an_explicit_request_for_fewer_steps_is_refused() {
         let run = Preset::Tiny.config();
         let require = |asked: &TrainConfig, steps| require_no_fewer_steps(&run, asked, 100, steps);
         let mut fewer = run.clone();

@@ -44,7 +44,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn a_folder_is_ones_own_until_it_is_let_go() {
+    fn a_folder_is_locked_until_the_lock_is_dropped() {
         let at = tempfile::tempdir().unwrap();
         let (run, renamed) = (at.path().join("run"), at.path().join("renamed"));
         fs::create_dir(&run).unwrap();

@@ -127,8 +127,8 @@ impl SettingsOfMean {
             return Ok(None);
         };
         let first_run = RunFolder::open(&first.path).and_then(|(run, _)| run.read_settings());
-        let is_chosen = config.init.is_some()
-            && first_run.is_ok_and(|run| beginning(&run) != beginning(config));
+        let is_chosen =
+            config.init.is_some() && first_run.is_ok_and(|run| start_of(&run) != start_of(config));
         Ok((!is_chosen).then(|| Self {
             first: first.path.clone(),
             networks: averaged.len(),
@@ -138,7 +138,7 @@ impl SettingsOfMean {
 }
 
 /// What a configuration starts from, independent of the folder that it was written in.
-fn beginning(config: &TrainConfig) -> (Option<PathBuf>, Option<String>) {
+fn start_of(config: &TrainConfig) -> (Option<PathBuf>, Option<String>) {
     let mut config = config.clone();
     config.make_absolute();
     (config.init, config.init_sha256)
@@ -426,7 +426,7 @@ mod tests {
     /// Which presets could start from which: `light` has the embedded network's layers; Monodepth2's has the same tensors, but other
     /// depths.
     #[test]
-    fn layers_and_range_decide() {
+    fn layers_and_range_decide_which_presets_match() {
         let net = |preset: Preset| preset.config().depth_net;
         for a in Preset::ALL {
             for b in Preset::ALL {
@@ -448,7 +448,7 @@ mod tests {
     }
 
     #[test]
-    fn the_settings_of_a_mean_are_told_from_those_of_a_run() {
+    fn settings_of_a_mean_are_distinguished_from_those_of_a_run() {
         let folder = tempfile::tempdir().unwrap();
         let run = RunFolder::create(folder.path()).unwrap();
         let part = |path: &str| AveragedNetwork {
@@ -465,9 +465,9 @@ mod tests {
         for (findings, of_mean) in [(mean, true), (TrainFindings::default(), false)] {
             run.write_config(&config, &findings).unwrap();
             let found = SettingsOfMean::of(&run.config_path(), &config).unwrap();
-            let said = found.map(|mean| mean.to_string()).unwrap_or_default();
+            let text = found.map(|mean| mean.to_string()).unwrap_or_default();
             for part in ["mean of 2 networks", "/first/best.safetensors"] {
-                assert_eq!(said.contains(part), of_mean, "{said}");
+                assert_eq!(text.contains(part), of_mean, "{text}");
             }
         }
     }
@@ -475,7 +475,7 @@ mod tests {
     /// The folder of a mean is known while its configuration is beside its weights; a start that the first network did not have was chosen
     /// by the user.
     #[test]
-    fn settings_of_a_mean_say_where_it_is_unless_somebody_chose_a_beginning() {
+    fn settings_of_a_mean_name_its_folder_unless_a_start_was_chosen() {
         let at = tempfile::tempdir().unwrap();
         let at = at.path();
         let first = RunFolder::create(&at.join("first")).unwrap();
@@ -513,7 +513,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_neither_there_nor_embedded_is_an_error_that_names_both() {
+    fn an_unknown_network_is_an_error_that_lists_the_embedded_ones() {
         let error = Start::named(Path::new("no-such-network")).unwrap_err();
         assert!(error.to_string().contains("no-such-network"), "{error}");
         let hint = error.hint().unwrap();
@@ -529,7 +529,7 @@ mod tests {
 
     /// Repeating a run reports that the network it started from is not embedded, or is another one.
     #[test]
-    fn other_weights_than_a_run_began_from_are_refused() {
+    fn weights_other_than_a_run_started_from_are_refused() {
         let mut config = Preset::Light.config();
         let start = Start::of(None, &config, false).unwrap();
         assert!(matches!(start, Start::Nothing));

@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_asked_for_is_the_presets_or_the_files() {
+    fn unset_values_come_from_the_preset_or_the_file() {
         let request = StartRequest {
             recordings: recordings(),
             ..StartRequest::default()
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_asked_for_takes_the_place_of_it() {
+    fn requested_values_replace_those_of_the_file() {
         let size = InputSize {
             width: 192,
             height: 64,
@@ -205,7 +205,7 @@ mod tests {
 
     /// Only then are the recordings opened, and these do not exist.
     #[test]
-    fn a_clock_is_measured_where_that_is_asked_for() {
+    fn the_clock_is_measured_on_request() {
         let request = StartRequest {
             recordings: AskedRecordings {
                 clock: Some(ClockAhead::Measured),

@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn an_estimate_names_what_else_could_be_chosen() {
+    fn an_estimate_lists_alternative_settings() {
         let full = Preset::Light.config().size;
         let light = Preset::Light.config_on(Compute::Processor);
         let estimate = Pace::of(light.clone(), Compute::Processor).estimate(1.0, 1200);
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_said_of_a_run_that_is_soon_over() {
+    fn a_short_run_has_no_estimate() {
         let light = Preset::Light.config_on(Compute::Processor);
         let mut pace = Pace::of(light, Compute::Processor);
         assert!((1..20).all(|step| pace.after_step(step, 20).is_none()));

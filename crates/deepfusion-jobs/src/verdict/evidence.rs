@@ -227,7 +227,7 @@ fn carried(
     Some((pixel.x, pixel.y, there.z))
 }
 
-/// The median over pixels of the difference between warped depth and the other frame's own depth.
+/// The median over pixels of |ln(warped depth / the other frame's own depth)|.
 fn consistency(
     predicted: &PredictedFrame,
     other: &DepthMap,
@@ -248,7 +248,7 @@ fn consistency(
     median(&differences)
 }
 
-/// The median over pixels of the difference between depth and the depth of the mirrored image.
+/// The median over pixels of |ln(depth of the mirrored image, mirrored back / depth)|.
 fn flip(depth: &DepthMap, mirrored: &DepthMap) -> Option<f64> {
     if (depth.width, depth.height) != (mirrored.width, mirrored.height) {
         return None;

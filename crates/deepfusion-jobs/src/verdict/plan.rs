@@ -211,7 +211,7 @@ mod tests {
     use std::ops::ControlFlow;
 
     #[test]
-    fn of_two_cameras_of_a_drive_one_certifies() {
+    fn only_one_of_a_drives_cameras_certifies() {
         let at = tempfile::tempdir().unwrap();
         let simulation = Simulation::new(&SimConfig {
             frames: 3,
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn an_even_choice() {
+    fn items_are_chosen_evenly() {
         assert_eq!(evenly((0..10).collect(), 3), [1, 5, 8]);
         assert_eq!(evenly(vec![1, 2], 3), [1, 2]);
         assert_eq!(evenly((0..7).collect(), 7).len(), 7);

@@ -125,7 +125,7 @@ mod tests {
     use deepfusion_model::{Learn, Preset};
 
     #[test]
-    fn metres_are_learned_from_video_with_speeds_alone() {
+    fn only_neighbouring_video_frames_with_speeds_give_a_metric_pose_net() {
         let config = Preset::Light.config();
         assert!(pose_net_is_metric(&config));
         let mut from_depth = config.clone();

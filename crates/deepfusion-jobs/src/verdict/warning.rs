@@ -29,7 +29,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_nobody_knows_is_warned_of() {
+    fn only_unknown_training_frames_give_a_warning() {
         let of = |why| {
             let verdict = Verdict {
                 no_certificate: Some(why),

@@ -35,7 +35,7 @@ void main() {
     if (any(greaterThanEqual(first + stride, size))) return;
     float a = at(first), b = at(first + ivec2(stride, 0)), c = at(first + ivec2(0, stride)), e = at(first + stride);
     if (!(shown(a) && shown(b) && shown(c) && shown(e))) return;
-    // A patch is torn where its disparity falls more than that of a plane at this distance from the camera would.
+    // A patch is torn where its disparity falls faster than on any plane that passes the camera at 1 / tear metres.
     float low = min(min(1.0 / a, 1.0 / b), min(1.0 / c, 1.0 / e)), high = max(max(1.0 / a, 1.0 / b), max(1.0 / c, 1.0 / e));
     if ((high - low) * camera.x > 1.5 * float(stride) * tear) return;
     p = first + stride * ivec2(corner == 1 || corner >= 4 ? 1 : 0, corner == 2 || corner == 3 || corner == 5 ? 1 : 0);

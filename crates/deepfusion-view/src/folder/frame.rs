@@ -77,9 +77,9 @@ pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
         ..
     } = files;
     let record = sidecar.as_ref().map(|s| &s.record);
-    let said_size = record.and_then(|r| r.size).map(|[w, h]| (w, h));
+    let sidecar_size = record.and_then(|r| r.size).map(|[w, h]| (w, h));
     let (mut intrinsics, mut shown) = (None, None);
-    match record.map(|r| (r.intrinsics, said_size)) {
+    match record.map(|r| (r.intrinsics, sidecar_size)) {
         Some((Some(k), Some((width, height)))) => {
             let camera = Intrinsics::from_numbers(k, (width, height));
             match camera.implausible() {
@@ -101,7 +101,7 @@ pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
                 path: picture.path.display().to_string(),
                 size: picture.size,
             });
-            match said_size.filter(|said| *said != picture.size) {
+            match sidecar_size.filter(|size| *size != picture.size) {
                 Some(expected) => problems.push(FrameProblem::PictureSize {
                     found: picture.size,
                     expected,
@@ -116,7 +116,7 @@ pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
         // The header of an array is not read here; the page compares the sizes again.
         Some(path) if path.extension().is_some_and(|e| e == "png") => match image_size(&path) {
             Ok(found) => {
-                if let Some(expected) = said_size.filter(|said| *said != found) {
+                if let Some(expected) = sidecar_size.filter(|size| *size != found) {
                     problems.push(FrameProblem::DepthSize { found, expected });
                 }
             }
@@ -125,10 +125,10 @@ pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
         Some(_) => {}
         None => problems.push(FrameProblem::NoDepth),
     }
-    let said = |field: &str| sidecar.as_ref()?.json.get(field).cloned();
+    let value_of = |field: &str| sidecar.as_ref()?.json.get(field).cloned();
     let passed_on = PASSED_ON
         .into_iter()
-        .filter_map(|field| Some((field, said(field)?)));
+        .filter_map(|field| Some((field, value_of(field)?)));
     FrameDetails {
         depth: depth.map(|d| d.file.clone()),
         intrinsics,
@@ -204,7 +204,7 @@ fn picture(
     {
         match picture_type(path) {
             Ok(Some((content_type, size))) => {
-                let said = sidecar
+                let recorded = sidecar
                     .filter(|_| is_named)
                     .and_then(|s| s.image_file)
                     .map(|file| file.bytes);
@@ -213,7 +213,7 @@ fn picture(
                     path: path.clone(),
                     content_type,
                     size,
-                    changed: said.is_some() && said != bytes,
+                    changed: recorded.is_some() && recorded != bytes,
                 });
             }
             // A video or a bag is not a picture; its frame may be beside the results.

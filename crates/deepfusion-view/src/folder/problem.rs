@@ -13,7 +13,7 @@ pub enum FrameProblem {
     #[error("{0}")]
     Unreadable(String),
     /// A small file does not have the format in which `predict` and `perceive` write it.
-    #[error("{file}: not written by this program: {why}")]
+    #[error("{file}: not in this program's format: {why}")]
     Foreign {
         /// The file's name.
         file: String,
@@ -102,7 +102,7 @@ mod tests {
                     file: "a.json".into(),
                     why: "no size".into(),
                 },
-                "a.json: not written by this program: no size",
+                "a.json: not in this program's format: no size",
             ),
             (
                 FrameProblem::Undrawable {

@@ -48,17 +48,20 @@ impl SmallFiles {
 
     /// The file of a frame's depth.
     pub(crate) fn depth<'a>(&self, entry: &'a Entry) -> Option<&'a FrameFile> {
-        entry.depths().find(|file| self.stand_for(file))
+        entry.depths().find(|file| self.belongs_to_sidecar(file))
     }
 
     /// The file of the standard deviation of a frame's depth.
     pub(crate) fn sigma<'a>(&self, entry: &'a Entry) -> Option<&'a FrameFile> {
-        entry.sigma.as_ref().filter(|file| self.stand_for(file))
+        entry
+            .sigma
+            .as_ref()
+            .filter(|file| self.belongs_to_sidecar(file))
     }
 
     /// Whether an output belongs to the sidecar, if there is one. An output that the sidecar does not name is older, perhaps of another camera.
     /// Sidecars of other programs name no outputs; then all belong.
-    fn stand_for(&self, file: &FrameFile) -> bool {
+    fn belongs_to_sidecar(&self, file: &FrameFile) -> bool {
         let sidecar = self.sidecar.as_ref();
         let named = sidecar.and_then(|s| s.json.get("files")?.as_array());
         named.is_none_or(|named| {

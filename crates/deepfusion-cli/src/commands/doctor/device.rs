@@ -28,7 +28,7 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
             output::print(&line(check))
         }
     };
-    let found = check_device(chosen, &device, |first| again(chosen, first), report)?;
+    let found = check_device(chosen, &device, |first| new_process(chosen, first), report)?;
     if json {
         output::print_json(&DeviceCheckRecord::of(chosen, &found))?;
     }
@@ -46,7 +46,7 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
 }
 
 /// This program as a new process, which checks the operations from `first` on and answers with [`print_from`].
-fn again(chosen: ComputeDevice, first: &str) -> Result<Command> {
+fn new_process(chosen: ComputeDevice, first: &str) -> Result<Command> {
     let program = std::env::current_exe().context("cannot find this program's file")?;
     let mut command = Command::new(program);
     command

@@ -91,7 +91,7 @@ mod tests {
     use deepfusion_model::Preset;
 
     #[test]
-    fn it_learns_on_the_first_part_alone() {
+    fn the_network_is_trained_only_on_the_first_part() {
         let settings = DemoSettings {
             steps: Some(8),
             size: Some((192, 64)),

@@ -86,7 +86,7 @@ mod tests {
 
     /// Even a short drive has a scan among the evaluated frames, and none of them is learned from.
     #[test]
-    fn every_drive_has_something_to_measure_on() {
+    fn every_drive_has_a_scan_to_evaluate_on() {
         assert_eq!(
             (learned_of(FRAMES), measured_of(FRAMES)),
             (0..120, 125..200)

@@ -63,7 +63,7 @@ impl Plan {
     }
 
     /// Changes a plan to continue its table: more runs of every row, and new paths of the training recordings (empty: unchanged).
-    pub fn go_on_with(&mut self, seeds: u64, data: &[PathBuf]) {
+    pub fn continue_with(&mut self, seeds: u64, data: &[PathBuf]) {
         self.seeds = self.seeds.max(seeds);
         if !data.is_empty() {
             self.config.data.paths = data.to_vec();

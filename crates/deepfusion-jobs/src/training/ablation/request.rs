@@ -159,7 +159,7 @@ mod tests {
 
     /// Parts that would teach a row more than its own parts are off by default.
     #[test]
-    fn a_preset_loses_what_would_blur_the_rows_and_a_file_keeps_it() {
+    fn parts_that_would_blur_the_rows_are_off_in_presets_only() {
         let plan = request().plan().unwrap();
         assert_eq!((plan.budget, plan.seeds, plan.rows.len()), (1, 1, 8));
         assert_eq!(plan.config.preset, Preset::Light);
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_table_decides_is_no_setting_of_its_rows() {
+    fn settings_decided_by_the_table_are_refused() {
         let with = |assignment: &str| {
             let assignments = vec![assignment.to_owned()];
             let request = PlanRequest {

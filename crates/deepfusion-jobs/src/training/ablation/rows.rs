@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn every_row_is_another_configuration_of_the_same_rest() {
+    fn rows_differ_only_in_their_parts() {
         let shared = shared(Preset::Light);
         assert_eq!(Row::table_3().len(), 8);
         let rows = Row::all();
@@ -149,7 +149,7 @@ mod tests {
     /// A row switches only its own part: not attention with HCE, not masks with the flow, not the pose used for warping with the speed
     /// loss.
     #[test]
-    fn a_row_lacks_its_own_part_alone() {
+    fn a_row_lacks_only_its_own_part() {
         for preset in [Preset::Light, Preset::Paper] {
             let mut shared = shared(preset);
             shared.loss.moving.enabled = false;
@@ -172,7 +172,7 @@ mod tests {
 
     /// Masks of dynamic pixels that all rows share are made from the flow: without it they are off.
     #[test]
-    fn masks_go_with_the_flow_that_they_are_made_of() {
+    fn masks_are_switched_off_with_the_flow() {
         let shared = shared(Preset::Paper);
         assert!(shared.loss.moving.enabled);
         for row in Row::table_3() {

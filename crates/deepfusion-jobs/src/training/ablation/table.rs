@@ -284,7 +284,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_spread_is_that_between_seeds() {
+    fn the_spread_is_the_deviation_between_seeds() {
         let one = Spread::of(&[0.25]).unwrap();
         assert_eq!((one.mean, one.std), (0.25, None));
         let three = Spread::of(&[1.0, 2.0, 3.0]).unwrap();

@@ -93,7 +93,7 @@ mod tests {
     use nalgebra::{Matrix3, Rotation3};
 
     #[test]
-    fn a_mountings_tilt_is_found() {
+    fn the_tilt_of_a_mount_is_found() {
         // Right, down and forward of a level camera, in the vehicle's axes (forward, left, up).
         let level = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
         for (pitch, roll) in [(0.0, 0.0), (0.1, 0.0), (-0.2, 0.05), (0.05, -0.3)] {
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_of_one_kind_are_one() {
+    fn nearly_equal_cameras_count_as_one() {
         let k = Intrinsics::from_numbers([721.5, 721.5, 609.6, 172.9], (1242, 375));
         let near = Intrinsics {
             fx: 718.9,

@@ -215,7 +215,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_work_lies_beside_whatever_way_the_folder_is_named() {
+    fn the_training_folder_is_beside_the_output_however_it_is_given() {
         let at = tempfile::tempdir().unwrap();
         let at = at.path();
         for given in ["mine", "mine/", "mine/.", "./mine//"] {
@@ -239,7 +239,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn what_a_link_points_at_is_replaced() {
+    fn the_target_of_a_link_is_replaced() {
         let at = tempfile::tempdir().unwrap();
         let at = fs::canonicalize(at.path()).unwrap();
         let (link, target) = (at.join("link"), at.join("disk/mine"));
@@ -258,7 +258,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_mount_point_is_told_from_a_folder() {
+    fn a_mount_point_is_distinguished_from_a_folder() {
         assert!(is_mount_point(Path::new("/proc")));
         assert!(!is_mount_point(Path::new("/no such folder")));
     }

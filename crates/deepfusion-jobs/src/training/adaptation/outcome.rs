@@ -142,7 +142,7 @@ mod tests {
 
     /// 4.6 to 4.8 % is kept, and the table shows why.
     #[test]
-    fn what_does_not_count_as_worse_is_in_the_table() {
+    fn the_table_shows_the_largest_value_that_is_not_worse() {
         let verdict = |flip| {
             let mut verdict = Verdict::default();
             verdict.without_truth.flip = Some(flip);
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_judged_is_not_kept() {
+    fn a_network_that_cannot_be_judged_is_not_kept() {
         let (before, after) = (Verdict::default(), Verdict::default());
         let outcome = Outcome::of("street".into(), 9, (before, after));
         let refusal = outcome.refusal();

@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_that_are_set_stay() {
+    fn explicit_sizes_are_kept() {
         let mut config = Preset::Light.config();
         learn_at_several_sizes(&mut config, false);
         let video = config.augmentation.video_sizes.clone();
