@@ -66,7 +66,7 @@ fn mistakes_are_named() {
         error
             .unwrap_err()
             .to_string()
-            .contains("gone.csv does not exist")
+            .contains("gone.csv: no such file or folder")
     );
 }
 

@@ -68,7 +68,11 @@ fn without_its_video_a_segment_is_inspected_and_not_opened() {
 
     let error = Dataset::open(root.path(), &OpenOptions::default()).unwrap_err();
     assert!(matches!(error, Error::NoSegmentVideo { .. }), "{error}");
-    assert!(error.to_string().contains("video.hevc: not found"));
+    assert!(
+        error
+            .to_string()
+            .contains("video.hevc: no such file or folder")
+    );
     assert!(error.hint().unwrap().contains("fetch video.hevc"));
 }
 

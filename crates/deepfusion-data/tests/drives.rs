@@ -290,7 +290,7 @@ fn a_missing_or_bad_calibration_is_named() {
     fs::remove_file(&file).unwrap();
     let refused = refusal(&drive);
     assert!(
-        refused.contains("calib_cam_to_cam.txt: not found"),
+        refused.contains("calib_cam_to_cam.txt: no such file or folder"),
         "{refused}"
     );
 }

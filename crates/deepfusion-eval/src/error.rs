@@ -52,7 +52,7 @@ pub enum Error {
         len: usize,
     },
     /// A protocol that cannot measure anything.
-    #[error("{field} is {value}: expected {expected}")]
+    #[error("{field} is {value}, expected {expected}")]
     Protocol {
         /// The field of [`crate::Protocol`].
         field: &'static str,

@@ -15,7 +15,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A line cannot be read.
-    #[error("{}:{line}: {field}: {problem}", path.display())]
+    #[error("{}:{line}: {}{problem}", path.display(), place(field))]
     Line {
         /// Path of the file.
         path: PathBuf,
@@ -95,6 +95,14 @@ pub enum Error {
     /// A DBC file or one of its signals cannot be used.
     #[error(transparent)]
     Motion(#[from] deepfusion_motion::Error),
+}
+
+/// The part of a line, before a problem; nothing for the whole line.
+fn place(field: &LineField) -> String {
+    match field {
+        LineField::Line => String::new(),
+        field => format!("{field}: "),
+    }
 }
 
 /// Why a camera's own track has no speed.

@@ -422,7 +422,7 @@ fn damaged_logs_are_named_by_line_and_column() {
             "torque.csv",
             ",30.946,1800",
             "",
-            "torque.csv:3: any: 7 values, the header has 9",
+            "torque.csv:3: 7 values, the header has 9",
         ),
         (
             "torque.csv",

@@ -33,7 +33,7 @@ pub enum ConfigProblem {
         key: &'static str,
     },
     /// A named file or folder does not exist.
-    #[error("{key}: {} does not exist", path.display())]
+    #[error("{key}: {}: no such file or folder", path.display())]
     NoFile {
         /// The key.
         key: &'static str,

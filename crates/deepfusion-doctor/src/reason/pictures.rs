@@ -82,12 +82,12 @@ impl PicturesReason {
             Self::BrightnessJumps { .. } => {
                 "record again with fixed exposure and gain, or let them change slowly"
             }
-            Self::Dark => "expose longer, or leave the darkest drives out",
+            Self::Dark => "expose longer, or leave out the darkest drives",
             Self::White => "expose shorter",
             Self::Soft => {
                 "focus the lens, clean the windscreen or expose shorter; use enlarged pictures at half their size"
             }
-            Self::Blurred { .. } => "expose shorter, fix the mount, or leave these frames out",
+            Self::Blurred { .. } => "expose shorter, fix the mount, or leave out these frames",
             Self::StillRim {
                 side,
                 pixels,

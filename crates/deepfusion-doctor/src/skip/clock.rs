@@ -19,7 +19,7 @@ pub enum ClockSkip {
     /// The offset is not known well enough.
     #[error("the estimate of {offset_s:.2} s has a standard error of {std_error_s:.2} s")]
     Unsure {
-        /// The offset, vehicle less camera, seconds.
+        /// The offset, vehicle minus camera, seconds.
         offset_s: f64,
         /// Its standard error, seconds.
         std_error_s: f64,

@@ -79,7 +79,7 @@ fn about(members: &[&Evaluation]) -> Vec<String> {
             &digest.get(..12).unwrap_or(digest)
         ),
         None => "These files do not record their ground truth: only the protocol and the number of images are known to be \
-                 that is known."
+                 the same."
             .into(),
     });
     notes.push(beside_published(report));
