@@ -111,7 +111,7 @@ pub(crate) enum CliError {
         path: PathBuf,
     },
     /// Several drives where one is needed.
-    #[error("{}: contains {drives} drives, but a bag holds one", input.display())]
+    #[error("{}: contains {drives} drives, but a bag can have only one", input.display())]
     SeveralDrives {
         /// What was given.
         input: PathBuf,
@@ -208,7 +208,7 @@ pub(crate) enum CliError {
     },
     /// An adapted network that is worse than the one it started from.
     #[cfg(feature = "train")]
-    #[error("not kept: it is worse on the held-out frames: {worse}; moved to {}", path.display())]
+    #[error("not kept: worse on the held-out frames ({worse}); moved to {}", path.display())]
     Refused {
         /// The folder it was moved to.
         path: PathBuf,

@@ -40,7 +40,7 @@ pub enum Error {
         total: usize,
     },
     /// The number of values is not width × height, or is zero.
-    #[error("`{name}` is {width}×{height} but has {}", count_of(*len, "value"))]
+    #[error("`{name}` is {width}x{height} but has {}", count_of(*len, "value"))]
     Shape {
         /// Name of the array.
         name: String,
@@ -76,7 +76,7 @@ pub enum Error {
         reason: IntervalsProblem,
     },
     /// A file that cannot be opened or read.
-    #[error("cannot read {path}")]
+    #[error("{path}: {source}")]
     Io {
         /// Path of the file.
         path: PathBuf,
@@ -93,7 +93,7 @@ pub enum Error {
         reason: ArrayProblem,
     },
     /// Ground truth without a prediction, or the other way round.
-    #[error("{path} has no array for {count} of {of}: {names}")]
+    #[error("{path}: no array for {count} of {of}: {names}")]
     UnmatchedNames {
         /// The file that lacks arrays.
         path: PathBuf,

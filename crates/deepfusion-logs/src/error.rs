@@ -65,7 +65,7 @@ pub enum Error {
         why: NoGps,
     },
     /// A CAN trace without a signal to decode.
-    #[error("{}: a CAN trace, and {problem}", path.display())]
+    #[error("{}: {problem}", path.display())]
     Signal {
         /// Path of the trace.
         path: PathBuf,

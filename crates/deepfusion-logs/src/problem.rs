@@ -85,7 +85,7 @@ pub enum BytesProblem {
     Blf(#[from] BlfProblem),
 }
 
-/// Why a log holds no speed.
+/// Why a log has no speed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpeedProblem {

@@ -314,7 +314,7 @@ fn can_traces_of_both_kinds_are_the_same() {
         .unwrap_err()
         .to_string();
     assert!(
-        error.contains("a DBC file that describes its frames is needed"),
+        error.contains("a CAN trace needs a DBC file that describes its frames"),
         "{error}"
     );
 }

@@ -7,7 +7,7 @@ use deepfusion_hint::Hint;
 pub enum Error {
     /// The depth image does not have the camera's size.
     #[error(
-        "depth has {}x{} pixels, expected {}x{} as the camera intrinsics",
+        "depth has {}x{} pixels, expected the camera intrinsics' {}x{}",
         found.0, found.1, expected.0, expected.1
     )]
     Size {

@@ -68,7 +68,7 @@ pub enum Error {
         topics: Vec<String>,
     },
     /// A message was decoded as another type than its connection's.
-    #[error("{}: {topic} holds {found}, expected {expected}", path.display())]
+    #[error("{}: {topic} has messages of type {found}, expected {expected}", path.display())]
     WrongType {
         /// Path of the bag.
         path: PathBuf,

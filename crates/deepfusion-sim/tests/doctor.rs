@@ -314,7 +314,7 @@ fn blurred_frames_are_counted() {
     let finding = found(&diagnosis, "blur", "blurred frames");
     assert!((value(finding) - 12.5).abs() < 3.0, "{finding:?}");
     assert!(finding.what.to_string().contains("frame 3"), "{finding:?}");
-    assert!(finding.hint.contains("expose shorter"), "{finding:?}");
+    assert!(finding.hint.contains("shorter exposure"), "{finding:?}");
 }
 
 #[test]
