@@ -1,4 +1,5 @@
-use deepfusion_hint::{Hint, count_of, system_hint};
+use deepfusion_fs::FileError;
+use deepfusion_hint::{Hint, count_of};
 use std::path::PathBuf;
 
 mod arrays;
@@ -76,13 +77,8 @@ pub enum Error {
         reason: IntervalsProblem,
     },
     /// A file that cannot be opened or read.
-    #[error("{path}: {source}")]
-    Io {
-        /// Path of the file.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// An array file with unexpected content.
     #[error("{path}: {reason}")]
     ArrayFile {
@@ -167,7 +163,7 @@ impl Hint for Error {
             Self::Intervals { .. } => {
                 Some("calibrate the network's uncertainty again".into())
             }
-            Self::Io { source, .. } => Some(system_hint(source.kind()).into()),
+            Self::File(error) => error.hint(),
             Self::ArrayFile { reason, .. } => reason.hint().map(str::to_owned),
             Self::UnmatchedNames { instead, .. } => Some(match instead {
                 Some(name) => format!(

@@ -19,6 +19,12 @@ fn plain(name: &str) -> DriveLog {
     read(&fixture(name), &ReadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
+#[test]
+fn a_missing_log_is_named() {
+    let error = read(Path::new("nowhere.csv"), &ReadOptions::default()).unwrap_err();
+    assert_eq!(error.to_string(), "nowhere.csv: no such file or folder");
+}
+
 fn true_speed(t: f64) -> f64 {
     8.0 + 3.0 * (0.4 * t).sin()
 }

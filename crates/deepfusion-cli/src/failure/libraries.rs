@@ -50,10 +50,8 @@ impl Reportable for deepfusion_sim::Error {
 
     fn hint_in_options(&self) -> Option<String> {
         match self {
-            Self::Config {
-                field, expected, ..
-            } => match simulator_option(field) {
-                Some(option) => Some(format!("{option} takes {expected}")),
+            Self::Config { field, .. } => match simulator_option(field) {
+                Some(option) => Some(format!("correct {option} (see --help)")),
                 None => self.hint(),
             },
             _ => self.hint(),

@@ -194,4 +194,14 @@ mod tests {
             "{hint}"
         );
     }
+
+    #[test]
+    fn the_hint_for_a_depth_image_asks_for_16_bits() {
+        let image = Error::Image {
+            path: "depth/0.png".into(),
+            problem: ImageProblem::NotDepth,
+        };
+        let hint = image.hint().unwrap();
+        assert!(hint.contains("16-bit grey PNG"), "{hint}");
+    }
 }
