@@ -1,6 +1,6 @@
-//! Corners of the board that the detector missed, searched where their neighbours predict them.
+//! Corners of the board that the detector missed, searched for where their neighbours predict them.
 
-use crate::corners::{Corner, grey, place};
+use crate::corners::{Corner, grey, refine_corner};
 use crate::grid::{Grid, extent};
 use image::GrayImage;
 use nalgebra::Vector2;
@@ -95,7 +95,7 @@ fn corner_at(
         (1.0..=f64::from(width) - 2.0).contains(&p.x)
             && (1.0..=f64::from(height) - 2.0).contains(&p.y)
     };
-    let found = place(image, guess, half).filter(inside)?;
+    let found = refine_corner(image, guess, half).filter(inside)?;
     if (found - guess).norm() > REACH * step || !crosswise(image, found, steps) {
         return None;
     }

@@ -72,7 +72,11 @@ pub(crate) fn between(a: f64, b: f64) -> f64 {
 /// Refines a corner: the point q for which all image gradients g around it are perpendicular to the lines towards it, in a window of `half`
 /// pixels to each side. It solves Σ w g gᵀ (p − q) = 0 over the pixels p (Förstner and Gülch, 1987; as OpenCV's `cornerSubPix`). `None` if
 /// q moves out of the window.
-pub(crate) fn place(image: &GrayImage, start: Vector2<f64>, half: i32) -> Option<Vector2<f64>> {
+pub(crate) fn refine_corner(
+    image: &GrayImage,
+    start: Vector2<f64>,
+    half: i32,
+) -> Option<Vector2<f64>> {
     let mut at = start;
     let reach = f64::from(half);
     for _ in 0..MAX_STEPS {
@@ -122,14 +126,14 @@ mod tests {
     use image::Luma;
 
     #[test]
-    fn lines_have_no_direction() {
+    fn the_angle_between_lines_ignores_their_direction() {
         assert!(between(0.1, PI + 0.1) < 1e-12);
         assert!((between(0.1, PI - 0.1) - 0.2).abs() < 1e-12);
     }
 
     /// Four squares with a soft edge, whose corner is between pixels.
     #[test]
-    fn a_corner_is_placed_between_pixels() {
+    fn a_corner_is_refined_between_pixels() {
         let (cx, cy) = (20.3, 17.8);
         let image = GrayImage::from_fn(40, 36, |x, y| {
             let soft = |d: f64| (d / 1.5).tanh();
@@ -137,16 +141,16 @@ mod tests {
             Luma([(125.0 + 80.0 * soft(u) * soft(v)).round() as u8])
         });
         let start = Vector2::new(21.0, 17.0);
-        let at = place(&image, start, 5).unwrap();
+        let at = refine_corner(&image, start, 5).unwrap();
         assert!((at - Vector2::new(cx, cy)).norm() < 0.02, "{at}");
         // A plain image has no corner, and a refinement finds none.
         let plain = GrayImage::from_pixel(40, 36, Luma([90]));
         assert!(find(&plain, false).is_empty());
-        assert_eq!(place(&plain, start, 5), None);
+        assert_eq!(refine_corner(&plain, start, 5), None);
     }
 
     #[test]
-    fn corners_know_their_edges_and_on_which_side_it_is_dark() {
+    fn corners_have_edge_directions_and_dark_squares() {
         // Squares of 16 pixels along the axes, with corners at 24 + 16 i; dark where both indices are even.
         let image = GrayImage::from_fn(128, 96, |x, y| {
             let dark = (x + 8) / 16 % 2 == (y + 8) / 16 % 2;

@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corners_are_counted_where_they_are() {
+    fn corners_are_counted_by_region() {
         // Left of the middle, from the top edge to the bottom edge.
         let corners = [(10.0, 0.0), (30.0, 50.0), (40.0, 99.0)].map(|(x, y)| Vector2::new(x, y));
         let coverage = Coverage::of(corners.iter(), (120, 100));

@@ -57,8 +57,8 @@ pub fn find_board(image: &GrayImage, board: &Board) -> BoardDetection {
             continue;
         };
         complete(&small, &mut corners, &mut grid, (board.columns, board.rows));
-        let corners = back(corners, factor);
-        match whole(&grid, board) {
+        let corners = to_full_size(corners, factor);
+        match board_corners(&grid, board) {
             Some(order) => {
                 let start: Vec<_> = order.iter().map(|i| corners[*i].at).collect();
                 if let Some(placed) = placed(image, &start, board) {
@@ -88,7 +88,7 @@ fn reduced(image: &GrayImage, factor: u32) -> GrayImage {
 }
 
 /// From the reduced image to the original one.
-fn back(mut corners: Vec<Corner>, factor: u32) -> Vec<Corner> {
+fn to_full_size(mut corners: Vec<Corner>, factor: u32) -> Vec<Corner> {
     let f = f64::from(factor);
     for corner in &mut corners {
         corner.at = corner.at.map(|n| f * (n + 0.5) - 0.5);
@@ -97,7 +97,7 @@ fn back(mut corners: Vec<Corner>, factor: u32) -> Vec<Corner> {
 }
 
 /// The board's corners among those of the grid, in the board's order. The number of columns may be that of its longer or its shorter side.
-fn whole(grid: &Grid, board: &Board) -> Option<Vec<usize>> {
+fn board_corners(grid: &Grid, board: &Board) -> Option<Vec<usize>> {
     let (columns, rows) = (board.columns, board.rows);
     let (_, all_columns, all_rows) = grid::extent(grid);
     let upright = grid::full_window(grid, columns, rows);
@@ -138,7 +138,7 @@ fn placed(image: &GrayImage, start: &[Vector2<f64>], board: &Board) -> Option<Ve
             let nearest = sides.into_iter().flatten();
             let nearest = nearest.map(|p| (p - here).norm()).fold(f64::MAX, f64::min);
             let half = (WINDOW * nearest).clamp(HALF_WINDOW_PX.0, widest);
-            placed.push(corners::place(image, here, half.round() as i32)?);
+            placed.push(corners::refine_corner(image, here, half.round() as i32)?);
         }
     }
     let last = |column: usize, row: usize| placed[row * columns + column];

@@ -18,7 +18,7 @@ pub enum Error {
     /// No picture shows the board.
     #[error("no board of {}x{} inner corners found in {}{}", board.columns, board.rows, count_of(*pictures, "picture"), instead(*seen))]
     NoBoard {
-        /// The board that was searched.
+        /// The board that was searched for.
         board: Board,
         /// Number of pictures searched.
         pictures: usize,
@@ -31,7 +31,7 @@ pub enum Error {
         board.columns, board.rows, count_of(*pictures, "picture"), instead(*seen)
     )]
     TooFewViews {
-        /// The board that was searched.
+        /// The board that was searched for.
         board: Board,
         /// Number of pictures that show it.
         found: usize,

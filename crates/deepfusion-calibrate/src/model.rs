@@ -271,7 +271,7 @@ mod tests {
         /// All derivatives, compared with central differences. Their truncation error is h² times the third derivative, which is some 1e4
         /// pixels here: 1e-8. Rounding adds 1e-13 / h.
         #[test]
-        fn slopes_are_derivatives(
+        fn derivatives_match_finite_differences(
             fisheye: bool, k in proptest::collection::vec(-0.1..0.1f64, 5),
             x in -0.6..0.6f64, y in -0.6..0.6f64, z in 0.7..1.5f64,
         ) {
@@ -300,7 +300,7 @@ mod tests {
 
         /// The lens is the same as that of `deepfusion-geometry`.
         #[test]
-        fn the_lens_is_that_of_the_geometry(
+        fn the_lens_matches_the_geometry_crate(
             fisheye: bool, k in proptest::collection::vec(-0.1..0.1f64, 5), x in -0.6..0.6f64, y in -0.6..0.6f64,
         ) {
             let model = if fisheye { LensModel::Fisheye } else { LensModel::BrownConrady };
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_of_view() {
+    fn fields_of_view_are_exact() {
         let pinhole =
             Camera::without_distortion(LensModel::BrownConrady, [320.0, 320.0, 319.5, 239.5]);
         assert!((pinhole.hfov_deg(640).unwrap() - 90.0).abs() < 1e-9);

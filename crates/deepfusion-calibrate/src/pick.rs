@@ -51,7 +51,7 @@ pub fn pick(candidates: &[Candidate], image_size: (u32, u32), most: usize) -> Ve
     let mut picked = vec![first];
     let mut away: Vec<f64> = candidates
         .iter()
-        .map(|c| apart(c, &candidates[first]))
+        .map(|c| greatest_move(c, &candidates[first]))
         .collect();
     while picked.len() < most {
         let Some(next) = (0..candidates.len()).max_by(|a, b| away[*a].total_cmp(&away[*b])) else {
@@ -62,7 +62,7 @@ pub fn pick(candidates: &[Candidate], image_size: (u32, u32), most: usize) -> Ve
         }
         picked.push(next);
         for (i, candidate) in candidates.iter().enumerate() {
-            away[i] = away[i].min(apart(candidate, &candidates[next]));
+            away[i] = away[i].min(greatest_move(candidate, &candidates[next]));
         }
     }
     picked.sort_unstable();
@@ -70,7 +70,7 @@ pub fn pick(candidates: &[Candidate], image_size: (u32, u32), most: usize) -> Ve
 }
 
 /// Greatest distance by which a board's corner moves from one view to the other, in pixels; a board turned by half a turn is the same.
-fn apart(a: &Candidate, b: &Candidate) -> f64 {
+fn greatest_move(a: &Candidate, b: &Candidate) -> f64 {
     let farthest = |pairs: &mut dyn Iterator<Item = (&Vector2<f64>, &Vector2<f64>)>| {
         pairs.map(|(p, q)| (p - q).norm()).fold(0.0, f64::max)
     };
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sharpest_and_what_is_far_from_it() {
+    fn the_sharpest_and_distant_views_are_picked() {
         let candidates = [at(0.0, 1.0), at(1.0, 5.0), at(300.0, 2.0), at(100.0, 2.0)];
         assert_eq!(pick(&candidates, (400, 300), 3), [1, 2, 3]);
         assert_eq!(pick(&candidates, (400, 300), 2), [1, 2]);
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn blur_is_less_sharp() {
+    fn blur_reduces_sharpness() {
         let edge = |width: f64| {
             GrayImage::from_fn(40, 20, |x, _| {
                 let grey = 127.0 + 100.0 * ((f64::from(x) - 20.0) / width).tanh();

@@ -233,7 +233,7 @@ mod tests {
 
     /// The derivatives by a pose, compared with central differences.
     #[test]
-    fn slopes_by_the_pose_are_derivatives() {
+    fn pose_derivatives_match_finite_differences() {
         let mut camera =
             Camera::without_distortion(LensModel::BrownConrady, [400.0, 390.0, 320.0, 240.0]);
         camera.numbers[4..].copy_from_slice(&[-0.2, 0.1, 0.001, -0.002, 0.01]);

@@ -2,7 +2,7 @@
 
 use crate::model::Camera;
 use crate::refine::{Fit, Pose};
-use crate::zhang::beginnings;
+use crate::zhang::starting_points;
 use crate::{
     Board, Calibration, Coverage, Error, LensModel, Result, StandardErrors, Undetermined, View,
     ViewFit,
@@ -52,15 +52,15 @@ pub fn calibrate(
         });
     }
     let mut used: Vec<usize> = (0..views.len()).collect();
-    let mut fitted = fit(&chosen(views, &used), &points, image_size, model)?;
+    let mut fitted = fit(&corners_of(views, &used), &points, image_size, model)?;
     for _ in 0..ROUNDS {
-        let bad = outlying(&fitted, &chosen(views, &used), &points);
+        let bad = outlying(&fitted, &corners_of(views, &used), &points);
         if bad.is_empty() || used.len() - bad.len() < LEAST_VIEWS {
             break;
         }
         let kept = used.iter().enumerate().filter(|(i, _)| !bad.contains(i));
         used = kept.map(|(_, view)| *view).collect();
-        fitted = fit(&chosen(views, &used), &points, image_size, model)?;
+        fitted = fit(&corners_of(views, &used), &points, image_size, model)?;
     }
     let mut found = calibration(&fitted, views, &used, &points, image_size)?;
     if board.square_m.is_none() {
@@ -73,7 +73,7 @@ pub fn calibrate(
     Ok(found)
 }
 
-fn chosen<'a>(views: &'a [View], used: &[usize]) -> Vec<&'a [Vector2<f64>]> {
+fn corners_of<'a>(views: &'a [View], used: &[usize]) -> Vec<&'a [Vector2<f64>]> {
     used.iter().map(|i| views[*i].corners.as_slice()).collect()
 }
 
@@ -84,7 +84,7 @@ fn fit(
     size: (u32, u32),
     model: LensModel,
 ) -> Result<Fit> {
-    let tried = beginnings(views, board, size, model)
+    let tried = starting_points(views, board, size, model)
         .into_iter()
         .take(TRIED);
     let tried = tried.filter_map(|fit| fit.refined(views, board, Some(TRIED_STEPS)));
@@ -138,7 +138,7 @@ fn calibration(
     board: &[Vector3<f64>],
     size: (u32, u32),
 ) -> Result<Calibration> {
-    let seen = chosen(views, used);
+    let seen = corners_of(views, used);
     let model = fit.camera.model;
     let cost = fit
         .cost(&seen, board)
@@ -176,7 +176,7 @@ fn view_fits(fit: &Fit, views: &[View], used: &[usize], board: &[Vector3<f64>]) 
         let place = used.iter().position(|u| *u == i);
         let pose = match place {
             Some(place) => Some(fit.poses[place]),
-            None => alone(fit, &view.corners, board),
+            None => pose_of(fit, &view.corners, board),
         };
         let middle = board[board.len() - 1] / 2.0;
         all.push(ViewFit {
@@ -194,7 +194,7 @@ fn view_fits(fit: &Fit, views: &[View], used: &[usize], board: &[Vector3<f64>]) 
 }
 
 /// The pose of a view that the camera was not fitted to, from its undistorted corners.
-fn alone(fit: &Fit, view: &[Vector2<f64>], board: &[Vector3<f64>]) -> Option<Pose> {
+fn pose_of(fit: &Fit, view: &[Vector2<f64>], board: &[Vector3<f64>]) -> Option<Pose> {
     use crate::homography::{homography, pose};
     let [fx, fy, cx, cy, ..] = fit.camera.numbers;
     let lens = fit.camera.distortion()?;

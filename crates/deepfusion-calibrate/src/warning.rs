@@ -130,9 +130,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_warning_is_said_in_words() {
+    fn warnings_have_their_messages() {
         let few = |used| CalibrationWarning::FewViews { used, enough: 10 };
-        for (warning, said) in [
+        for (warning, message) in [
             (few(1), "only 1 view: 10 to 30, from many sides, are better"),
             (
                 few(6),
@@ -159,7 +159,7 @@ mod tests {
                 "the corners are off by 0.81 px (root mean square): check that the board is flat, the pictures are sharp, and the lens model is right (fisheye or not)",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), message);
         }
     }
 }

@@ -13,7 +13,7 @@ const PINHOLE_WIDTHS: [f64; 5] = [0.42, 0.7, 1.0, 1.6, 2.8];
 const FISHEYE_VIEWS: [f64; 6] = [1.2, 1.75, 2.3, 2.8, 3.3, 4.0];
 
 /// Starting points, the best first: cameras with the principal point in the middle of the image, and poses.
-pub(crate) fn beginnings(
+pub(crate) fn starting_points(
     views: &[&[Vector2<f64>]],
     board: &[Vector3<f64>],
     size: (u32, u32),
@@ -44,8 +44,8 @@ pub(crate) fn beginnings(
     fits.into_iter().map(|(_, fit)| fit).collect()
 }
 
-/// Zhang's constraints with a known principal point and no skew. For every homography H = [h₁ h₂ h₃] from the board to the image, h₁ᵀ B h₂
-/// = 0 and h₁ᵀ B h₁ = h₂ᵀ B h₂ with B = diag(1/fx², 1/fy², 1). They are linear in 1/fx² and 1/fy².
+/// Zhang's constraints with a known principal point and no skew: h₁ᵀ B h₂ = 0 and h₁ᵀ B h₁ = h₂ᵀ B h₂ for every homography
+/// H = [h₁ h₂ h₃] from the board to the image, with B = diag(1/fx², 1/fy², 1). They are linear in 1/fx² and 1/fy².
 fn closed_form(
     views: &[&[Vector2<f64>]],
     board: &[Vector3<f64>],

@@ -133,7 +133,7 @@ fn exact_corners_give_the_exact_camera() {
 /// Over many sets of corners with equal errors, results scatter as the reported standard errors predict: for sixty values per parameter,
 /// the root mean square of (found − truth) / error is 1 within 30 % (three times 1/√(2·60)).
 #[test]
-fn standard_errors_are_those_of_the_results() {
+fn standard_errors_match_the_scatter_of_results() {
     let board = Board::new(8, 6, 0.03).unwrap();
     let pinhole = [700.0, 705.0, 410.0, 290.0];
     let k = Intrinsics::from_numbers(pinhole, SIZE);

@@ -36,7 +36,7 @@ fn board() -> Board {
 }
 
 /// Greatest and root mean square distance of corners in the same or the opposite order, in pixels.
-fn apart(found: &[Vector2<f64>], expected: &[Vector2<f64>]) -> (f64, f64) {
+fn corner_distances(found: &[Vector2<f64>], expected: &[Vector2<f64>]) -> (f64, f64) {
     assert_eq!(found.len(), expected.len());
     let of = |found: Vec<&Vector2<f64>>| {
         let d: Vec<f64> = found
@@ -68,7 +68,7 @@ fn views(camera: &Value) -> Vec<View> {
 /// Every board is found, also at the border of a fisheye image. OpenCV's own corners are up to 0.18 px from the truth here (noise, blur and
 /// JPEG); ours must be as near to both.
 #[test]
-fn corners_are_opencvs() {
+fn corners_match_opencv() {
     for (name, camera) in reference()["cameras"].as_object().unwrap() {
         let (mut worst, mut worst_truth) = (0.0f64, 0.0f64);
         for (view, found) in camera["views"]
@@ -77,9 +77,10 @@ fn corners_are_opencvs() {
             .iter()
             .zip(views(camera))
         {
-            let (most, mean) = apart(&found.corners, &points(&view["corners"]));
-            let (most_truth, mean_truth) = apart(&found.corners, &points(&view["truth"]));
-            let (_, opencvs) = apart(&points(&view["corners"]), &points(&view["truth"]));
+            let (most, mean) = corner_distances(&found.corners, &points(&view["corners"]));
+            let (most_truth, mean_truth) =
+                corner_distances(&found.corners, &points(&view["truth"]));
+            let (_, opencvs) = corner_distances(&points(&view["corners"]), &points(&view["truth"]));
             assert!(most < 0.2 && mean < 0.08, "{}: {most} {mean}", found.name);
             assert!(most_truth < 0.2, "{}: {most_truth}", found.name);
             assert!(
@@ -113,7 +114,7 @@ fn k(found: &Calibration) -> [f64; 4] {
 /// For OpenCV's corners the least-squares fit is OpenCV's: same cost, same minimum. The corners are stored to 0.001 px, and OpenCV computed
 /// in single precision; 1e-4 of the focal length is 0.03 px.
 #[test]
-fn the_fit_is_opencvs() {
+fn the_fit_matches_opencv() {
     for (name, camera) in reference()["cameras"].as_object().unwrap() {
         let of = |view: &Value| View {
             name: view["file"].as_str().unwrap().to_owned(),
@@ -161,7 +162,7 @@ fn the_fit_is_opencvs() {
 
 /// From the pictures alone: near to OpenCV, and as near to the truth as the standard errors say (within four of them).
 #[test]
-fn the_camera_is_the_true_one() {
+fn the_camera_matches_the_truth() {
     for (name, camera) in reference()["cameras"].as_object().unwrap() {
         let found = calibrate(&views(camera), &board(), size(camera), model(camera)).unwrap();
         println!(
@@ -271,13 +272,13 @@ fn another_board_is_an_error() {
     // A part of the board is not accepted as the board.
     for (columns, rows) in [(8, 6), (9, 7), (7, 5)] {
         let asked = Board::new(columns, rows, 0.025).unwrap();
-        let look = find_board(&image, &asked);
+        let detection = find_board(&image, &asked);
         let expected = BoardDetection::Other {
             columns: 9,
             rows: 6,
             corners: 54,
         };
-        assert_eq!(look, expected, "{columns}x{rows}");
+        assert_eq!(detection, expected, "{columns}x{rows}");
     }
     // Rows and columns may be swapped.
     let BoardDetection::Board(turned) = find_board(&image, &Board::new(6, 9, 0.025).unwrap())
@@ -299,7 +300,7 @@ fn another_board_is_an_error() {
 
 /// Large pictures are searched at reduced size and refined at full size. A board may also lie on its side.
 #[test]
-fn large_and_turned_pictures() {
+fn boards_are_found_in_large_and_turned_pictures() {
     use image::imageops::{FilterType, resize, rotate90};
     let image = picture("brown/01.jpg");
     let BoardDetection::Board(small) = find_board(&image, &board()) else {
@@ -313,7 +314,7 @@ fn large_and_turned_pictures() {
         .iter()
         .map(|p| p.map(|n| (n + 0.5) / 5.0 - 0.5))
         .collect();
-    let (most, _) = apart(&back, &small);
+    let (most, _) = corner_distances(&back, &small);
     assert!(most < 0.2, "{most}");
     let BoardDetection::Board(turned) = find_board(&rotate90(&image), &board()) else {
         panic!("not found");
@@ -323,12 +324,12 @@ fn large_and_turned_pictures() {
         .iter()
         .map(|p| Vector2::new(p.y, last - p.x))
         .collect();
-    let (most, _) = apart(&back, &small);
+    let (most, _) = corner_distances(&back, &small);
     assert!(most < 0.02, "{most}");
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn invalid_input_is_rejected() {
     for (columns, rows, square) in [
         (2, 6, 0.025),
         (9, 101, 0.025),

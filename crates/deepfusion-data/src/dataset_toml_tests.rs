@@ -7,7 +7,7 @@ fn read(text: &str) -> Result<FolderConfig> {
 }
 
 #[test]
-fn a_mounted_camera_sees_ahead() {
+fn a_mount_sets_the_cameras_position() {
     let config = read("[mount]\nforward_m = 1.5\nup_m = 1.2\n").unwrap();
     // A stone 10 m ahead of the axle and 1 m to its left is 8.5 m ahead of the camera, to the left, 1.2 m below.
     let seen = config
@@ -20,7 +20,7 @@ fn a_mounted_camera_sees_ahead() {
 }
 
 #[test]
-fn angles_turn_the_way_they_say() {
+fn mount_angles_have_the_documented_signs() {
     let ahead = |text: &str| {
         let config = read(&format!("[mount]\n{text} = 10\n")).unwrap();
         config
@@ -44,7 +44,7 @@ fn angles_turn_the_way_they_say() {
 }
 
 #[test]
-fn mistakes_are_named() {
+fn errors_name_the_key() {
     for (text, problem) in [
         ("fsp = 10", "unknown field `fsp`"),
         ("fps = 0", "fps is 0, expected a number above 0"),
@@ -81,7 +81,7 @@ fn read_below(above: &str, own: &str) -> Result<FolderConfig> {
 }
 
 #[test]
-fn the_file_above_completes_what_is_not_said() {
+fn missing_keys_come_from_the_folder_above() {
     let above = "for_folders = true\nfps = 20\nspeed_unit = 'km/h'\nstart_s = 5\nspeed = 'all.csv'\nhfov_deg = 69\n\
                  [mount]\nup_m = 1.2\n[vehicle]\nspeed_scale = 0.98\n";
     let config = read_below(above, "fps = 25\n").unwrap();
@@ -102,7 +102,7 @@ fn the_file_above_completes_what_is_not_said() {
 }
 
 #[test]
-fn a_file_above_that_is_a_recordings_says_nothing() {
+fn a_file_above_without_for_folders_is_ignored() {
     for above in [
         "fps = 20\n",
         "yaw_known = false\n",

@@ -651,7 +651,7 @@ mod tests {
     }
 
     #[test]
-    fn every_ending_of_a_video_is_named() {
+    fn every_video_extension_is_listed() {
         for ending in deepfusion_video::VIDEO_ENDINGS {
             let named = LOOKED_FOR
                 .split([' ', ','])
@@ -661,7 +661,7 @@ mod tests {
     }
 
     #[test]
-    fn one_frame_is_no_plural() {
+    fn a_split_with_one_frame_has_a_singular_message() {
         let of = |entries| Error::SplitSelectsNothing {
             split: "split.txt".into(),
             path: "drive".into(),

@@ -84,7 +84,7 @@ fn near(found: f64, expected: f64) {
     assert!((found - expected).abs() < 1e-3, "{found}, not {expected}");
 }
 
-fn says(text: &str, parts: &[&str]) {
+fn assert_contains(text: &str, parts: &[&str]) {
     for part in parts {
         assert!(text.contains(part), "`{part}` is not in: {text}");
     }
@@ -111,7 +111,7 @@ fn no_topic_and_a_signal_do_not_contradict_each_other() {
     near(drive.speed(), 10.0);
     write_bag_config(&drive.bag, &OpenOptions::default(), true).unwrap();
     let written = fs::read_to_string(drive.bag.with_extension("toml")).unwrap();
-    says(&written, &["speed = \"none\"", "[can]"]);
+    assert_contains(&written, &["speed = \"none\"", "[can]"]);
     near(drive.speed(), 10.0);
     // The caller can leave out the signal too.
     let options = OpenOptions {
@@ -124,15 +124,15 @@ fn no_topic_and_a_signal_do_not_contradict_each_other() {
 
 /// All bits set means a missing value in J1939: here 655.35 km/h.
 #[test]
-fn a_value_that_a_bus_has_not_is_no_speed() {
+fn values_outside_a_signals_range_are_left_out() {
     let drive = Drive::new(BY_DBC, |bag| {
         bag.can("/can", &ten_mps()).can("/can", &frame(0x158, -1));
         bag.can("/can", &ten_mps());
     });
     near(drive.speed(), 10.0);
-    let said = text_of(open(&drive.bag).unwrap().warnings());
-    says(
-        &said,
+    let warnings = text_of(open(&drive.bag).unwrap().warnings());
+    assert_contains(
+        &warnings,
         &["can.speed: 25 values outside the signal's range left out"],
     );
 }
@@ -183,7 +183,7 @@ fn a_topic_and_a_signal_of_one_quantity_are_refused() {
             bag.can("/can", &ten_mps()).ackermann("/drive", 5.0, 0.1);
         });
         let (topic, signal) = (format!("topics.{key}"), format!("can.{key}"));
-        says(
+        assert_contains(
             &drive.refusal(),
             &["drive.toml", "/drive", &topic, &signal, "keep one of them"],
         );
@@ -204,7 +204,7 @@ fn steering_on_the_bus_is_not_mixed_with_a_topics() {
 }
 
 #[test]
-fn one_topic_is_chosen_by_its_type() {
+fn the_speeds_topic_is_chosen_by_its_type() {
     let drive = Drive::new("", |bag| {
         bag.ackermann("/drive", 3.0, 0.0).odometry("/odom", 4.0);
         bag.twist("/twist", 5.0);
@@ -217,11 +217,11 @@ fn one_topic_is_chosen_by_its_type() {
     let drive = Drive::new("", |bag| {
         bag.twist("/a", 5.0).twist("/b", 10.0);
     });
-    says(&drive.refusal(), &["/a, /b", "[topics] speed ="]);
+    assert_contains(&drive.refusal(), &["/a, /b", "[topics] speed ="]);
 }
 
 #[test]
-fn steering_of_a_bare_number_is_read_where_it_is_named() {
+fn steering_from_plain_numbers_is_read_if_named() {
     let fill = |bag: &mut TinyBag| {
         bag.twist("/twist", 10.0).float("/wheel", 0.1);
     };
@@ -256,7 +256,7 @@ fn the_documented_signals_are_read() {
 }
 
 #[test]
-fn a_signal_that_cannot_be_is_refused_by_its_field() {
+fn errors_name_the_field_of_an_invalid_signal() {
     let by_name = BY_DBC.replace("dbc = \"vehicle.dbc\"\n", "");
     let steering = INLINE_STEERING.replace("steering_rad = 0.0174533\n", "");
     for (sidecar, parts) in [
@@ -299,8 +299,8 @@ fn a_signal_that_cannot_be_is_refused_by_its_field() {
             bag.can("/can", &ten_mps());
         });
         let refusal = drive.refusal();
-        says(&refusal, &["drive.toml"]);
-        says(&refusal, &parts);
+        assert_contains(&refusal, &["drive.toml"]);
+        assert_contains(&refusal, &parts);
     }
 }
 
@@ -309,7 +309,7 @@ fn a_bus_that_was_not_recorded_is_an_error() {
     let drive = Drive::new(INLINE, |bag| {
         bag.twist("/twist", 5.0);
     });
-    says(&drive.refusal(), &["can_msgs/Frame", "[can]", "drive.toml"]);
+    assert_contains(&drive.refusal(), &["can_msgs/Frame", "[can]", "drive.toml"]);
 }
 
 #[test]
@@ -319,7 +319,7 @@ fn a_signal_without_a_frame_is_an_error() {
     });
     let dataset = open(&drive.bag).unwrap();
     assert_eq!(dataset.frames()[12].speed_mps, None);
-    says(&text_of(dataset.warnings()), &["can.speed", "0x158"]);
+    assert_contains(&text_of(dataset.warnings()), &["can.speed", "0x158"]);
 }
 
 const CALIBRATION: &str = "%YAML:1.0\n---\n\
@@ -327,7 +327,7 @@ const CALIBRATION: &str = "%YAML:1.0\n---\n\
     distortion_coefficients: !!opencv-matrix\n   rows: 4\n   cols: 1\n   dt: d\n   data: [ -0.1, 0., 0., 0. ]\n";
 
 #[test]
-fn a_calibration_file_is_the_camera() {
+fn a_calibration_file_gives_the_camera() {
     let file = "calibration = \"sensors/camera.yaml\"\n";
     let drive = |image, sidecar: &str| {
         let drive = Drive::on(image, sidecar, |_| {});
@@ -354,17 +354,17 @@ fn a_calibration_file_is_the_camera() {
     assert_ne!(bent, flat);
 
     let rectified = drive("/camera/image_rect", file).refusal();
-    says(&rectified, &["camera.yaml", "`rect`", "topics.image"]);
+    assert_contains(&rectified, &["camera.yaml", "`rect`", "topics.image"]);
     let both = drive("/camera/image", &format!("{CAMERA}{file}")).refusal();
-    says(&both, &["drive.toml", "[camera] and calibration"]);
+    assert_contains(&both, &["drive.toml", "[camera] and calibration"]);
     let gone = drive("/camera/image", "calibration = \"gone.yaml\"\n").refusal();
-    says(&gone, &["drive.toml", "calibration", "gone.yaml"]);
+    assert_contains(&gone, &["drive.toml", "calibration", "gone.yaml"]);
 }
 
 /// The file beside a link takes precedence; otherwise the one beside its target is read.
 #[cfg(unix)]
 #[test]
-fn the_file_beside_a_link_counts() {
+fn the_file_beside_a_link_is_used() {
     use std::os::unix::fs::symlink;
     let drive = Drive::new("scenario = \"target\"\n", |bag| {
         bag.twist("/twist", 5.0);
@@ -432,7 +432,7 @@ fn a_bag_without_a_camera_is_left_out_of_a_folder_and_named() {
 
 /// Files with a bag's name that are not bags, before and after a good one, and the remains of another bag, without images.
 #[test]
-fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
+fn unreadable_bags_of_a_folder_are_listed_with_the_others() {
     let drive = Drive::new("", |bag| {
         bag.twist("/vehicle/twist", 10.0);
     });
@@ -459,8 +459,8 @@ fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
         assert!(text.contains(part), "{part}: {text}");
     }
     let json = serde_json::to_value(&seen).unwrap();
-    let said = json["unreadable"][1]["error"].as_str().unwrap();
-    assert!(said.contains("z.bag: not a ROS bag"), "{said}");
+    let message = json["unreadable"][1]["error"].as_str().unwrap();
+    assert!(message.contains("z.bag: not a ROS bag"), "{message}");
 
     fs::remove_file(&drive.bag).unwrap();
     let none = inspect(at).unwrap();
@@ -482,7 +482,7 @@ fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
 }
 
 #[test]
-fn a_twist_s_speed_is_scaled_like_any_other() {
+fn a_twists_speed_is_scaled_like_any_other() {
     let sidecar = "[vehicle]\nspeed_scale = 0.9\n";
     // From a twist with a yaw rate, which is used as it is, and from one whose motion is fused.
     for yaw_rate in [0.2, 0.0] {
@@ -495,7 +495,7 @@ fn a_twist_s_speed_is_scaled_like_any_other() {
     let wrong = Drive::new("[vehicle]\nspeed_scale = 3.6\n", |bag| {
         bag.twist("/twist", 10.0);
     });
-    says(
+    assert_contains(
         &wrong.refusal(),
         &["drive.toml", "vehicle.speed_scale is 3.6", "0.5 to 2"],
     );
@@ -509,21 +509,21 @@ fn a_twist_without_a_yaw_rate_has_a_speed() {
     });
     near(never.speed(), 10.0);
     assert!(!open(&never.bag).unwrap().yaw_known());
-    let now_and_then = Drive::new("", |bag| {
+    let sometimes = Drive::new("", |bag| {
         let gap = |t: f64| (t / 0.04).round() as i64 % 3 == 0;
         bag.turning_twist("/twist", move |t| {
             (10.0, if gap(t) { f64::NAN } else { 0.2 })
         });
     });
-    near(now_and_then.speed(), 10.0);
-    near(now_and_then.turn_rad(), 0.5 * 0.2);
-    assert!(open(&now_and_then.bag).unwrap().yaw_known());
+    near(sometimes.speed(), 10.0);
+    near(sometimes.turn_rad(), 0.5 * 0.2);
+    assert!(open(&sometimes.bag).unwrap().yaw_known());
 }
 
 /// Rates give the rotation between two images, not the attitude: the integral since the bag's beginning, which grows with a bias or on a
 /// ramp, must not add roll in bends.
 #[test]
-fn rates_of_roll_and_pitch_tilt_a_pair_alone() {
+fn roll_and_pitch_rates_are_integrated_only_within_a_pair() {
     let drive = Drive::new("", |bag| {
         bag.tumbling_twist("/twist", 10.0, [0.0, 1.5, 1.0]);
     });
@@ -537,8 +537,8 @@ fn rates_of_roll_and_pitch_tilt_a_pair_alone() {
     }
     // The same in a copy in KITTI's layout.
     let out = drive.folder.path().join("copy");
-    let whole = std::slice::from_ref(&dataset);
-    convert_to_kitti(whole, &out, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    let source = std::slice::from_ref(&dataset);
+    convert_to_kitti(source, &out, &mut |_, _| ControlFlow::Continue(())).unwrap();
     let copy = Dataset::open(&out, &OpenOptions::default())
         .unwrap()
         .remove(0);
@@ -563,7 +563,7 @@ fn a_steering_angle_without_a_wheelbase_does_not_replace_a_yaw_rate() {
 
 /// If drivers leave the header's time at 0, all their messages would be at the same time, decades before the images.
 #[test]
-fn messages_without_a_time_have_that_of_their_recording() {
+fn messages_without_a_time_get_their_time_of_recording() {
     let sidecar = "[vehicle]\nwheelbase_m = 2.5\n";
     let drive = Drive::new(sidecar, |bag| {
         bag.without_stamps();
@@ -581,7 +581,7 @@ fn messages_without_a_time_have_that_of_their_recording() {
     );
     let warnings = text_of(dataset.warnings());
     for topic in ["/twist", "/imu", "/drive"] {
-        says(
+        assert_contains(
             &warnings,
             &[&format!(
                 "{topic}: 25 messages have no time in their header"
@@ -598,12 +598,12 @@ fn messages_without_a_time_have_that_of_their_recording() {
 
 /// The same for CAN frames.
 #[test]
-fn frames_of_the_bus_without_a_time_have_that_of_their_recording() {
+fn can_frames_without_a_time_get_their_time_of_recording() {
     let drive = Drive::new(INLINE, |bag| {
         bag.without_stamps().can("/can", &ten_mps());
     });
     near(drive.speed(), 10.0);
-    says(
+    assert_contains(
         &text_of(open(&drive.bag).unwrap().warnings()),
         &["/can: 25 messages"],
     );
@@ -611,7 +611,7 @@ fn frames_of_the_bus_without_a_time_have_that_of_their_recording() {
 
 /// Unreadable parts are distinguished from oddities.
 #[test]
-fn damage_is_a_list_of_its_own_among_the_warnings() {
+fn damage_is_a_separate_list_among_the_warnings() {
     let drive = Drive::new("", |bag| {
         bag.without_stamps().twist("/twist", 10.0);
     });
@@ -625,7 +625,7 @@ fn damage_is_a_list_of_its_own_among_the_warnings() {
     let [damage] = cut.damage() else {
         panic!("{:?}", cut.damage());
     };
-    let said = damage.to_string();
-    assert!(said.starts_with("the bag is damaged: "), "{said}");
+    let message = damage.to_string();
+    assert!(message.starts_with("the bag is damaged: "), "{message}");
     assert!(cut.warnings().contains(damage), "{:?}", cut.warnings());
 }

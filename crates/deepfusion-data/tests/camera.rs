@@ -83,7 +83,7 @@ fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset, Error> {
 }
 
 #[test]
-fn a_field_of_view_is_a_camera() {
+fn a_field_of_view_gives_a_camera() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path();
     photographs(folder, &[vec![], vec![]]);
@@ -109,7 +109,7 @@ fn a_field_of_view_is_a_camera() {
 
 /// A folder whose settings apply to its subfolders gives all their recordings, each with its own settings.
 #[test]
-fn a_fleet_is_opened_as_a_whole() {
+fn all_recordings_of_a_folder_are_opened_with_for_folders() {
     let fleet = tempfile::tempdir().unwrap();
     for (drive, photos) in [("monday", 2), ("tuesday", 3)] {
         let blocks: Vec<Vec<Field>> = (0..photos).map(|_| vec![]).collect();
@@ -143,7 +143,7 @@ fn a_fleet_is_opened_as_a_whole() {
 
 /// Settings for all folders of a fleet; a drive's own calibration takes precedence.
 #[test]
-fn the_camera_may_stand_once_for_many_recordings() {
+fn one_camera_may_be_set_for_many_recordings() {
     let fleet = tempfile::tempdir().unwrap();
     let drive = fleet.path().join("drive");
     photographs(&drive, &[vec![], vec![]]);
@@ -159,7 +159,7 @@ fn the_camera_may_stand_once_for_many_recordings() {
 }
 
 #[test]
-fn angles_that_are_none_are_refused() {
+fn invalid_fields_of_view_are_refused() {
     let root = tempfile::tempdir().unwrap();
     photographs(root.path(), &[vec![]]);
     for (toml, why) in [
@@ -187,7 +187,7 @@ fn angles_that_are_none_are_refused() {
 
 /// As written by piexif 1.1.3 for {FocalLengthIn35mmFilm: 21}: its last directory has no end.
 #[test]
-fn a_block_without_its_end_says_what_it_holds() {
+fn complete_fields_of_a_truncated_exif_block_are_read() {
     let block = b"MM\0*\0\0\0\x08\0\x01\x87\x69\0\x04\0\0\0\x01\0\0\0\x1a\0\0\0\0\0\x01\xa4\x05\0\x03\0\0\0\x01\0\x15\0\0";
     let root = tempfile::tempdir().unwrap();
     let path = root.path().join("photo.jpg");
@@ -200,7 +200,7 @@ fn a_block_without_its_end_says_what_it_holds() {
 }
 
 #[test]
-fn photographs_say_what_their_camera_is() {
+fn photographs_give_their_camera() {
     let root = tempfile::tempdir().unwrap();
     let film = vec![short(Tag::FocalLengthIn35mmFilm, 26)];
     let turned = vec![
@@ -258,7 +258,7 @@ fn photographs_say_what_their_camera_is() {
 }
 
 #[test]
-fn a_calibration_comes_before_what_photographs_say() {
+fn a_calibration_takes_precedence_over_exif() {
     let root = tempfile::tempdir().unwrap();
     photographs(root.path(), &[vec![short(Tag::FocalLengthIn35mmFilm, 26)]]);
     fs::write(root.path().join("intrinsics.txt"), "50 50 31 23").unwrap();
@@ -267,7 +267,7 @@ fn a_calibration_comes_before_what_photographs_say() {
 }
 
 #[test]
-fn photographs_that_say_nothing_or_too_much_are_no_camera() {
+fn photographs_without_a_usable_focal_length_give_no_camera() {
     let root = tempfile::tempdir().unwrap();
     for (name, block) in [
         ("nothing", vec![]),
@@ -290,8 +290,8 @@ fn photographs_that_say_nothing_or_too_much_are_no_camera() {
         );
         let hint = error.hint().unwrap();
         assert!(hint.contains("hfov_deg = ") && hint.len() < 250, "{hint}");
-        let said = format!("{name}: no calibration of its camera");
-        assert!(error.to_string().ends_with(&said), "{error}");
+        let expected = format!("{name}: no calibration of its camera");
+        assert!(error.to_string().ends_with(&expected), "{error}");
     }
     // Different zooms, or two phones, in one folder.
     let folder = root.path().join("mixed");
@@ -323,7 +323,7 @@ fn a_fisheye_calibration_is_undone() {
 }
 
 #[test]
-fn a_calibration_that_is_given_goes_before_those_that_are_found() {
+fn a_given_calibration_takes_precedence_over_those_found() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("drive");
     folder::write_drive(&folder, 3, 5.0, 0.0);

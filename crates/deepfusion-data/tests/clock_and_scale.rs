@@ -111,7 +111,7 @@ fn near(found: f64, expected: f64, of: &str) {
 }
 
 #[test]
-fn clock_and_scale_are_taken_out_once_in_every_layout() {
+fn clock_offset_and_speed_scale_are_applied_once_in_every_layout() {
     for drive in drives() {
         let (of, t) = (drive.layout, drive.at_s);
         let default = OpenOptions::default();
@@ -147,7 +147,7 @@ fn clock_and_scale_are_taken_out_once_in_every_layout() {
 }
 
 #[test]
-fn what_was_taken_out_is_not_taken_out_again_after_a_conversion() {
+fn a_converted_recording_is_not_corrected_again() {
     for drive in drives() {
         write_config(&drive, BOTH);
         let first = open(&drive.path, &OpenOptions::default());
@@ -175,7 +175,7 @@ fn what_was_taken_out_is_not_taken_out_again_after_a_conversion() {
 }
 
 #[test]
-fn a_date_s_file_is_for_all_its_drives_and_a_drive_s_own_goes_before_it() {
+fn a_dates_file_applies_to_its_drives_but_a_drives_own_takes_precedence() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     let date = drive.parent().unwrap().join("dataset.toml");
@@ -197,7 +197,7 @@ fn a_date_s_file_is_for_all_its_drives_and_a_drive_s_own_goes_before_it() {
 }
 
 #[test]
-fn what_cannot_be_a_clock_or_a_scale_is_refused_by_its_file() {
+fn errors_name_the_file_with_an_invalid_clock_or_scale() {
     for drive in drives() {
         for (text, problem) in [
             (
@@ -223,7 +223,7 @@ fn what_cannot_be_a_clock_or_a_scale_is_refused_by_its_file() {
 
 /// A clock that counts from the video's start, with a speed signal that started before it.
 #[test]
-fn times_before_1970_are_moved_and_not_cut_off() {
+fn times_before_1970_are_shifted_not_clamped() {
     let root = tempfile::tempdir().unwrap();
     let names: Vec<String> = (0..8).map(|n| format!("{n:06}")).collect();
     folder::write_images(

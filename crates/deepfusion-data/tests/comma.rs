@@ -24,7 +24,7 @@ fn write_segment(folder: &Path) {
 }
 
 #[test]
-fn without_its_video_a_segment_is_inspected_and_not_opened() {
+fn a_segment_without_its_video_is_inspected_but_not_opened() {
     let root = tempfile::tempdir().unwrap();
     write_segment(root.path());
     let seen = inspect(root.path()).unwrap();
@@ -79,7 +79,7 @@ fn without_its_video_a_segment_is_inspected_and_not_opened() {
 /// Ten seconds at 8 m/s and 0.2 rad/s to the left: gyroscope and accelerometer in the device's axes (forward, right,
 /// down), the steering wheel at 0.2 · 2.7 / 8 rad times a ratio of 15.
 #[test]
-fn a_segment_s_gyroscope_and_steering_measure_its_turns() {
+fn gyroscope_and_steering_give_a_segments_turns() {
     let root = tempfile::tempdir().unwrap();
     let log = root.path().join("processed_log");
     let t = Array1::from_iter((0..1001).map(|i| 100.0 + f64::from(i) * 0.01));

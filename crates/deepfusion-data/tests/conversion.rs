@@ -40,12 +40,12 @@ fn convert(dataset: Dataset, out: &Path) {
 }
 
 #[test]
-fn one_that_fails_in_the_middle_leaves_nothing() {
+fn a_failed_conversion_leaves_nothing() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let dataset = drive(root);
     let image = root.join(DRIVE).join("image_02/data/0000000010.png");
-    let whole = fs::read(&image).unwrap();
+    let original = fs::read(&image).unwrap();
     fs::write(&image, "broken").unwrap();
     let (new, empty) = (root.join("new"), root.join("empty"));
     fs::create_dir(&empty).unwrap();
@@ -55,17 +55,17 @@ fn one_that_fails_in_the_middle_leaves_nothing() {
             done.push(frames);
             ControlFlow::Continue(())
         });
-        let said = failed.unwrap_err().to_string();
-        assert!(said.contains("0000000010.png"), "{said}");
+        let message = failed.unwrap_err().to_string();
+        assert!(message.contains("0000000010.png"), "{message}");
         assert_eq!(done, [8], "it failed after its first frames");
     }
     assert!(!new.exists() && names(&empty).is_empty());
-    fs::write(&image, whole).unwrap();
+    fs::write(&image, original).unwrap();
     convert(dataset, &new);
 }
 
 #[test]
-fn what_a_killed_one_left_is_removed_and_what_another_writes_is_not() {
+fn the_remains_of_a_killed_conversion_are_removed_but_not_those_of_a_running_one() {
     let root = tempfile::tempdir().unwrap();
     let dataset = drive(&root.path().join("drive"));
     let out = root.path().join("kitti");
@@ -87,7 +87,7 @@ fn what_a_killed_one_left_is_removed_and_what_another_writes_is_not() {
 }
 
 #[test]
-fn one_that_is_stopped_leaves_nothing_unless_it_is_done() {
+fn a_stopped_conversion_leaves_nothing_unless_all_frames_are_done() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let dataset = drive(root);
@@ -136,7 +136,7 @@ fn kitti_of(dataset: &Dataset, out: &Path) -> Dataset {
 
 /// Packets have zeros for unmeasured values: without a mark, a copy of a drive without a yaw rate would go straight through every bend.
 #[test]
-fn what_was_not_measured_is_not_measured_in_the_copy() {
+fn unmeasured_values_stay_unknown_in_the_copy() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let folder = root.join("folder");
@@ -196,7 +196,7 @@ fn a_frame_without_a_time_has_none_in_the_copy() {
 
 /// Names such as 20240101120000.png: a line for every number would not fit on any disk.
 #[test]
-fn numbers_that_are_dates_are_counted_anew() {
+fn frames_with_dates_as_numbers_are_renumbered() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let names = ["20240101120000", "20240101120001", "20240101120007"];
@@ -225,7 +225,7 @@ fn numbers_that_are_dates_are_counted_anew() {
 
 /// An error must not name the temporary folder, which no longer exists.
 #[test]
-fn what_cannot_be_written_is_named_by_its_place() {
+fn write_errors_name_the_final_path() {
     let root = tempfile::tempdir().unwrap();
     let dataset = drive(&root.path().join("drive"));
     let out = root.path().join("kitti");
@@ -234,9 +234,9 @@ fn what_cannot_be_written_is_named_by_its_place() {
         fs::remove_dir_all(out.join(aside.unwrap())).unwrap();
         ControlFlow::Continue(())
     });
-    let said = failed.unwrap_err().to_string();
-    assert!(said.contains("_drive_0001_sync"), "{said}");
-    assert!(!said.contains("partial"), "{said}");
+    let message = failed.unwrap_err().to_string();
+    assert!(message.contains("_drive_0001_sync"), "{message}");
+    assert!(!message.contains("partial"), "{message}");
 }
 
 fn bag_of(dataset: &Dataset, out: &Path) -> Dataset {
@@ -248,7 +248,7 @@ fn bag_of(dataset: &Dataset, out: &Path) -> Dataset {
 
 /// Frames on both sides of a pause are not neighbours, in a bag and in files with numbers.
 #[test]
-fn frames_that_a_bag_has_not_leave_out_their_numbers() {
+fn missing_frames_leave_out_their_numbers_in_a_bag() {
     let root = tempfile::tempdir().unwrap();
     let numbers: Vec<u64> = (0..5).chain(9..12).collect();
     let drive = TinyDrive {
@@ -270,7 +270,7 @@ fn frames_that_a_bag_has_not_leave_out_their_numbers() {
 
 /// An assumed mount must stay marked as assumed in a copy, or it would never be [aimed](Dataset::aim).
 #[test]
-fn a_place_of_the_camera_that_was_assumed_is_assumed_in_the_copy() {
+fn an_assumed_mount_stays_assumed_in_the_copy() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let folder = root.join("folder");
@@ -289,11 +289,13 @@ fn a_place_of_the_camera_that_was_assumed_is_assumed_in_the_copy() {
             let (own, copied) = (dataset.cam_from_vehicle(), copy.cam_from_vehicle());
             let apart = own.unwrap().inverse() * copied.unwrap();
             assert!(apart.translation().norm() < 1e-9 && apart.angle() < 1e-9);
-            let said: Vec<String> = copy.warnings().iter().map(ToString::to_string).collect();
+            let warnings: Vec<String> = copy.warnings().iter().map(ToString::to_string).collect();
             assert_eq!(
-                said.iter().any(|w| w.contains("it looks straight ahead")),
+                warnings
+                    .iter()
+                    .any(|w| w.contains("it looks straight ahead")),
                 assumed,
-                "{said:?}"
+                "{warnings:?}"
             );
         }
     }

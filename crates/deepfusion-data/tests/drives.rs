@@ -42,7 +42,7 @@ fn a_drive_a_date_and_a_root_open_the_same() {
 
 /// The folders of a fleet may be roots of several drives, have the same names, and lack a camera.
 #[test]
-fn of_a_fleet_those_without_images_of_the_camera_are_left_out() {
+fn drives_without_images_of_the_camera_are_left_out() {
     let fleet = tempfile::tempdir().unwrap();
     for (place, cameras) in [("a", vec![2]), ("b", vec![2, 3])] {
         let drive = TinyDrive {
@@ -65,15 +65,18 @@ fn of_a_fleet_those_without_images_of_the_camera_are_left_out() {
     };
     let found = right().unwrap();
     assert_eq!(found.len(), 1);
-    let said = text_of(found[0].warnings());
-    assert!(said.contains("left out for lack of images: a"), "{said}");
+    let warnings = text_of(found[0].warnings());
+    assert!(
+        warnings.contains("left out for lack of images: a"),
+        "{warnings}"
+    );
     fs::remove_dir_all(fleet.path().join("b")).unwrap();
     let error = right().unwrap_err();
     assert!(matches!(error, Error::NoImages { .. }), "{error}");
 }
 
 #[test]
-fn either_camera_or_both() {
+fn one_camera_or_both_are_opened() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive {
         cameras: vec![2, 3],
@@ -105,7 +108,7 @@ fn either_camera_or_both() {
 }
 
 #[test]
-fn a_camera_given_beside_kittis_is_refused() {
+fn a_camera_given_for_kitti_is_refused() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     let options = OpenOptions {
@@ -117,7 +120,7 @@ fn a_camera_given_beside_kittis_is_refused() {
 }
 
 #[test]
-fn a_camera_lies_where_p_rect_says() {
+fn the_cameras_position_comes_from_p_rect() {
     let root = tempfile::tempdir().unwrap();
     let date = TinyDrive::default().write(root.path()).join("..");
     let read = |camera| Calibration::read(&date, camera).unwrap();
@@ -146,7 +149,7 @@ fn a_camera_lies_where_p_rect_says() {
 }
 
 #[test]
-fn nothing_there_is_said() {
+fn missing_and_empty_paths_are_errors() {
     let text = refusal(Path::new("/no/such/drive"));
     assert!(
         text.contains("/no/such/drive: no such file or folder"),
@@ -171,7 +174,7 @@ fn nothing_there_is_said() {
 }
 
 #[test]
-fn what_is_there_instead_is_said() {
+fn errors_describe_what_was_found_instead() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     // With the reader, the error is more precise.
@@ -240,7 +243,7 @@ fn a_folder_within_a_drive_is_recognised() {
 }
 
 #[test]
-fn a_missing_or_bad_calibration_is_named() {
+fn errors_name_a_missing_or_bad_calibration() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     let file = drive.join("../calib_cam_to_cam.txt");
@@ -296,7 +299,7 @@ fn a_missing_or_bad_calibration_is_named() {
 }
 
 #[test]
-fn a_frame_of_another_size_is_named_with_both_sizes() {
+fn errors_name_a_frame_of_another_size_with_both_sizes() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     let image = image::RgbImage::new(40, 20);
@@ -311,7 +314,7 @@ fn a_frame_of_another_size_is_named_with_both_sizes() {
 }
 
 #[test]
-fn broken_parts_are_named() {
+fn errors_name_broken_parts() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     let packet = drive.join("oxts/data/0000000002.txt");
@@ -352,7 +355,7 @@ fn broken_parts_are_named() {
 }
 
 #[test]
-fn stray_files_are_no_frames_and_png_beats_jpeg() {
+fn stray_files_are_ignored_and_png_is_preferred_to_jpeg() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     let data = drive.join("image_02/data");
@@ -446,7 +449,7 @@ fn an_inspection_lists_what_cannot_be_read() {
 
 /// If no drive has a left camera, the right one is inspected; an error common to all drives is reported once.
 #[test]
-fn an_inspection_takes_the_right_camera_where_no_drive_has_a_left_one() {
+fn an_inspection_uses_the_right_camera_if_no_drive_has_a_left_one() {
     let root = tempfile::tempdir().unwrap();
     let drives = [7, 8].map(|number| {
         let name = format!("2030_01_02/2030_01_02_drive_{number:04}_sync");
@@ -467,7 +470,7 @@ fn an_inspection_takes_the_right_camera_where_no_drive_has_a_left_one() {
 }
 
 #[test]
-fn an_inspection_of_images_alone_says_what_is_unknown() {
+fn an_inspection_of_images_without_oxts_shows_what_is_unknown() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     fs::remove_dir_all(drive.join("oxts")).unwrap();

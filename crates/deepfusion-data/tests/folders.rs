@@ -85,7 +85,7 @@ fn a_kitti_drive_and_a_folder_of_it_give_the_same_snippets() {
 
 /// Image dates without a time zone only matter with a log, and if the first image's time is not given.
 #[test]
-fn a_zone_is_asked_for_where_it_matters() {
+fn a_missing_time_zone_gives_a_warning_only_if_it_matters() {
     let root = tempfile::tempdir().unwrap();
     write_drive(root.path(), 3, 8.0, 0.4);
     let at = |name: &str| root.path().join(name);
@@ -95,13 +95,13 @@ fn a_zone_is_asked_for_where_it_matters() {
     let rows = "2011-09-26T13:04:32Z,8,0.1\n2011-09-26T13:04:33Z,8,0.1\n";
     let table = format!("time,speed_mps,yaw_rate_radps\n{rows}");
     fs::write(at("speed.csv"), table).unwrap();
-    let asks = || text_of(open(root.path()).warnings()).contains("timestamps.txt: its dates");
-    assert!(asks());
+    let warns = || text_of(open(root.path()).warnings()).contains("timestamps.txt: its dates");
+    assert!(warns());
     fs::write(at("dataset.toml"), "start_s = 1317042272.3\n").unwrap();
-    assert!(!asks(), "the first image's time is given");
+    assert!(!warns(), "the first image's time is given");
     fs::remove_file(at("dataset.toml")).unwrap();
     fs::remove_file(at("speed.csv")).unwrap();
-    assert!(!asks(), "there is no log");
+    assert!(!warns(), "there is no log");
 }
 
 /// KITTI's drive 0005 as a folder with tables made from its oxts: every pair's motion is the same except for the
@@ -248,7 +248,7 @@ fn an_inspection_reports_streams_and_what_is_assumed() {
 }
 
 #[test]
-fn images_alone_open_and_say_why_they_cannot_train() {
+fn images_without_speeds_are_opened_but_cannot_be_trained_on() {
     let root = tempfile::tempdir().unwrap();
     for n in 0..4 {
         picture(n)
@@ -284,7 +284,7 @@ fn images_alone_open_and_say_why_they_cannot_train() {
 }
 
 #[test]
-fn a_camera_is_never_made_up() {
+fn a_camera_is_never_guessed() {
     let root = tempfile::tempdir().unwrap();
     write_images(root.path(), &["a", "b"]);
     let text = refusal(root.path());
@@ -334,7 +334,7 @@ fn a_calibration_of_another_size_is_refused() {
 }
 
 #[test]
-fn clocks_without_a_common_time_are_refused_and_can_be_joined() {
+fn times_that_do_not_overlap_are_refused_unless_start_s_joins_them() {
     let root = tempfile::tempdir().unwrap();
     write_drive(root.path(), 8, 10.0, 0.0);
     let speeds: String = (0..20)
@@ -365,7 +365,7 @@ fn clocks_without_a_common_time_are_refused_and_can_be_joined() {
 }
 
 #[test]
-fn depth_images_are_ground_truth_in_a_unit_that_is_said() {
+fn depth_images_are_ground_truth_in_the_given_unit() {
     let root = tempfile::tempdir().unwrap();
     write_drive(root.path(), 3, 10.0, 0.0);
     let depth = root.path().join("depth");
@@ -418,7 +418,7 @@ fn distorted_images_are_corrected_when_they_are_loaded() {
 }
 
 #[test]
-fn images_and_a_video_together_need_a_word() {
+fn images_and_a_video_together_need_a_choice() {
     let root = tempfile::tempdir().unwrap();
     write_drive(root.path(), 3, 10.0, 0.0);
     fs::write(root.path().join("drive.mp4"), "").unwrap();
@@ -457,7 +457,7 @@ fn a_split_selects_by_the_folders_name() {
 
 /// Other recordings in the folder of a recording are named in a warning, since they are not read.
 #[test]
-fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
+fn other_recordings_in_the_folder_are_named() {
     let root = tempfile::tempdir().unwrap();
     let at = root.path();
     write_drive(at, 4, 10.0, 0.0);
@@ -469,12 +469,12 @@ fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
     for file in ["predict-1-of-1.manifest.json", "drive.mp4"] {
         fs::write(at.join("out").join(file), "").unwrap();
     }
-    let said = |path: &Path| {
+    let warning = |path: &Path| {
         let warnings = text_of(open(path).warnings());
         let about = warnings.lines().filter(|w| w.contains("not read"));
         about.collect::<Vec<_>>().join("\n")
     };
-    assert_eq!(said(at), "");
+    assert_eq!(warning(at), "");
     write_drive(&at.join("second"), 4, 10.0, 0.0);
     fs::create_dir(at.join("third")).unwrap();
     fs::write(at.join("third/clip.MP4"), "").unwrap();
@@ -482,22 +482,22 @@ fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
         "{} is read only as an image folder; second, third in it look like recordings and are not read (",
         at.display()
     );
-    assert!(said(at).starts_with(&expected), "{}", said(at));
+    assert!(warning(at).starts_with(&expected), "{}", warning(at));
     let passed_over = open(at).passed_over().map(ToString::to_string);
-    assert_eq!(passed_over, Some(said(at)));
+    assert_eq!(passed_over, Some(warning(at)));
     let noted = text_of(&inspect(at).unwrap().drives[0].warnings);
-    assert!(noted.lines().any(|line| line == said(at)), "{noted}");
+    assert!(noted.lines().any(|line| line == warning(at)), "{noted}");
     // Given by its own path, there is no warning.
-    assert_eq!(said(&at.join("second")), "");
+    assert_eq!(warning(&at.join("second")), "");
 
     // KITTI drives, with a video of them; files within a drive belong to it.
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     write_drive(&drive.join("extra"), 4, 10.0, 0.0);
-    assert_eq!(said(root.path()), "");
+    assert_eq!(warning(root.path()), "");
     // A video with the name of an output.
     fs::write(root.path().join("drive_video.mp4"), "").unwrap();
-    assert_eq!(said(root.path()), "");
+    assert_eq!(warning(root.path()), "");
     let expected = |rest: &str| {
         format!(
             "{} is read only as KITTI raw; {rest}",
@@ -508,9 +508,9 @@ fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
     let one = expected(
         "drive.mp4 in it looks like a recording and is not read (give it by its own path)",
     );
-    assert_eq!(said(root.path()), one);
+    assert_eq!(warning(root.path()), one);
     write_drive(&root.path().join("walk"), 4, 10.0, 0.0);
     let both = expected("drive.mp4, walk in it look like recordings and are not read (");
-    assert!(said(root.path()).starts_with(&both));
-    assert_eq!(said(&drive), "");
+    assert!(warning(root.path()).starts_with(&both));
+    assert_eq!(warning(&drive), "");
 }

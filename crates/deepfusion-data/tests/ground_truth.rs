@@ -146,7 +146,7 @@ fn names(npz: &mut NpzReader<File>) -> Vec<String> {
 }
 
 #[test]
-fn several_drives_or_cameras_show_in_the_names() {
+fn names_include_drive_and_camera_if_there_are_several() {
     let root = tempfile::tempdir().unwrap();
     let tiny = TinyDrive {
         frames: vec![0, 1],
@@ -201,15 +201,15 @@ fn scans_are_exported_in_the_order_of_the_split() {
     let expected = lines.map(|(drive, frame)| format!("{drive}/{frame:010}"));
     assert_eq!(export(&datasets), expected);
     // Frames outside the split come after it.
-    let whole = open(&root.path().join("2030_01_02/a_sync"), Cameras::Left);
-    let mixed: Vec<Dataset> = whole.into_iter().chain(datasets).collect();
+    let outside = open(&root.path().join("2030_01_02/a_sync"), Cameras::Left);
+    let mixed: Vec<Dataset> = outside.into_iter().chain(datasets).collect();
     let names = export(&mixed);
     assert_eq!(names[..4], expected);
     assert_eq!(names[4..], ["a_sync/0000000000", "a_sync/0000000003"]);
 }
 
 #[test]
-fn drives_of_one_name_keep_their_arrays_apart() {
+fn drives_with_the_same_name_get_different_array_names() {
     let root = tempfile::tempdir().unwrap();
     let tiny = TinyDrive {
         frames: vec![0],

@@ -97,7 +97,7 @@ fn scan_file(root: &Path, frame: usize) -> PathBuf {
 }
 
 #[test]
-fn a_drive_has_the_simulator_s_camera_motion_path_and_depth() {
+fn a_drive_has_the_simulators_camera_motion_path_and_depth() {
     let root = tempfile::tempdir().unwrap();
     let street = street(20, 10.0);
     let folder = write_drive(&street, root.path(), &[0]);
@@ -130,7 +130,7 @@ fn a_drive_has_the_simulator_s_camera_motion_path_and_depth() {
 
 /// Camera 1 moves with the same vehicle, 60 cm to the right; its ground truth uses its own rectification.
 #[test]
-fn the_right_camera_is_where_the_files_say() {
+fn the_right_camera_has_the_mount_in_the_files() {
     let root = tempfile::tempdir().unwrap();
     let street = street(6, 10.0);
     write_drive(&street, root.path(), &[0, 1]);
@@ -228,7 +228,7 @@ fn poses_may_be_missing() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_file_line_and_field() {
+fn errors_name_file_line_and_field() {
     let root = tempfile::tempdir().unwrap();
     let folder = write_drive(&street(4, 10.0), root.path(), &[0]);
     write(&scan_file(root.path(), 1), [0_u8; 32]);

@@ -77,7 +77,7 @@ fn write_sequence(
 }
 
 #[test]
-fn a_sequence_has_the_simulator_s_camera_motion_path_and_depth() {
+fn a_sequence_has_the_simulators_camera_motion_path_and_depth() {
     let root = tempfile::tempdir().unwrap();
     let street = street(40, 10.0);
     let folder = write_sequence(&street, root.path(), "04", &[2], true);
@@ -120,12 +120,12 @@ fn a_sequence_has_the_simulator_s_camera_motion_path_and_depth() {
     );
     let json = serde_json::to_value(&seen).unwrap();
     assert_eq!(json["kind"], "kitti_odometry");
-    let said = common::text_of(&seen.drives[0].warnings);
-    assert!(said.contains("KITTI raw's calibration"), "{said}");
+    let warnings = common::text_of(&seen.drives[0].warnings);
+    assert!(warnings.contains("KITTI raw's calibration"), "{warnings}");
 }
 
 #[test]
-fn cameras_fall_back_on_grey_and_every_sequence_is_opened() {
+fn grey_cameras_are_used_without_colour_and_all_sequences_are_opened() {
     let root = tempfile::tempdir().unwrap();
     let street = street(3, 10.0);
     write_sequence(&street, root.path(), "04", &[0, 1], true);
@@ -165,7 +165,7 @@ fn cameras_fall_back_on_grey_and_every_sequence_is_opened() {
 }
 
 #[test]
-fn monodepth2_s_splits_are_taken() {
+fn monodepth2s_splits_select_frames() {
     let root = tempfile::tempdir().unwrap();
     write_sequence(&street(4, 10.0), root.path(), "09", &[2, 3], true);
     let split = root.path().join("test_files_09.txt");
@@ -199,7 +199,7 @@ fn monodepth2_s_splits_are_taken() {
 
 /// The published lists, if available: `sequence frame side`, with the benchmark's numbers.
 #[test]
-fn the_field_s_lists_are_read() {
+fn published_splits_are_read() {
     let Some(folder) = common::real_data("splits/odom") else {
         return;
     };
@@ -211,7 +211,7 @@ fn the_field_s_lists_are_read() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_file_line_and_field() {
+fn errors_name_file_line_and_field() {
     let root = tempfile::tempdir().unwrap();
     let folder = write_sequence(&street(4, 10.0), root.path(), "04", &[2], true);
     let poses = root.path().join("poses/04.txt");
@@ -338,7 +338,7 @@ fn without_times_there_are_frames_and_depth_but_no_motion() {
 
 /// A folder with a `dataset.toml` is an image folder, whatever the names of its files.
 #[test]
-fn an_image_folder_with_such_names_stays_one() {
+fn an_image_folder_with_a_sequences_names_is_not_a_sequence() {
     let root = tempfile::tempdir().unwrap();
     let folder = write_sequence(&street(3, 10.0), root.path(), "04", &[2], true);
     write(

@@ -50,7 +50,7 @@ fn driving_straight_moves_the_camera_by_speed_times_real_time() {
 }
 
 #[test]
-fn in_a_turn_the_lever_arm_shows_and_the_two_directions_are_inverse() {
+fn in_a_turn_the_lever_arm_counts_and_both_directions_are_inverse() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive {
         yaw_rate_radps: 0.6,
@@ -105,7 +105,7 @@ fn missing_frames_break_pairs() {
 }
 
 #[test]
-fn a_source_is_as_far_away_as_is_asked_for() {
+fn sources_are_at_least_the_requested_distance_away() {
     let root = tempfile::tempdir().unwrap();
     let dataset = open(&TinyDrive::default().write(root.path()));
     let next = dataset.snippets(&[1], 0.5).unwrap();
@@ -134,7 +134,7 @@ fn a_source_is_as_far_away_as_is_asked_for() {
 }
 
 #[test]
-fn standing_pairs_are_dropped_and_a_standing_car_is_an_error() {
+fn standing_pairs_are_dropped_and_a_standing_vehicle_is_an_error() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     // Packets are 4 ms later than images, so the pair (0, 1) still includes a little of packet 2's speed.
@@ -165,7 +165,7 @@ fn standing_pairs_are_dropped_and_a_standing_car_is_an_error() {
 }
 
 #[test]
-fn a_drive_of_one_frame_says_so() {
+fn a_drive_with_one_frame_is_an_error() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive {
         frames: vec![5],
@@ -177,7 +177,7 @@ fn a_drive_of_one_frame_says_so() {
 }
 
 #[test]
-fn what_ego_motion_needs_is_named_when_missing() {
+fn errors_name_what_is_missing_for_ego_motion() {
     for part in [
         "image_02/timestamps.txt",
         "oxts/timestamps.txt",
@@ -205,7 +205,7 @@ fn what_ego_motion_needs_is_named_when_missing() {
 }
 
 #[test]
-fn pairs_without_oxts_about_them_are_dropped() {
+fn pairs_without_nearby_oxts_are_dropped() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive {
         frames: (0..20).collect(),

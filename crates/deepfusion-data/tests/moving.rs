@@ -86,7 +86,7 @@ fn pixels_of_box(date: &Path, y: f32, kind: GtKind) -> Vec<bool> {
 /// Boxes move relative to the road, not to the observing vehicle: with the same boxes and a vehicle at standstill,
 /// the other one is moving.
 #[test]
-fn boxes_move_over_the_ground() {
+fn boxes_that_move_over_ground_are_dynamic() {
     for (speed_mps, moving_y) in [(10.0, -5.0), (0.0, 5.0)] {
         let folder = tempfile::tempdir().unwrap();
         let drive = drive_at(folder.path(), speed_mps);
@@ -104,7 +104,7 @@ fn boxes_move_over_the_ground() {
 }
 
 #[test]
-fn without_labels_nothing_is_said() {
+fn without_labels_or_own_motion_dynamic_pixels_are_unknown() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive_at(folder.path(), 10.0);
     assert!(open(&drive).moving_labels().unwrap().is_none());
@@ -115,7 +115,7 @@ fn without_labels_nothing_is_said() {
 }
 
 #[test]
-fn a_broken_file_is_named() {
+fn errors_name_a_broken_file() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive_at(folder.path(), 10.0);
     two_cars(&drive);
@@ -153,7 +153,7 @@ fn masks_are_read_and_must_fit() {
 }
 
 #[test]
-fn exact_depth_is_the_simulators_and_its_sky_is_infinite() {
+fn exact_depth_is_only_that_of_the_simulator_and_its_sky_is_infinite() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive_at(folder.path(), 10.0);
     let depths = drive.join("proj_depth/groundtruth/image_02");

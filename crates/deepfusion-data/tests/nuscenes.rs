@@ -124,7 +124,7 @@ fn write_scene(street: &Simulation, root: &Path) -> PathBuf {
 }
 
 #[test]
-fn a_scene_has_the_simulator_s_camera_motion_path_and_depth() {
+fn a_scene_has_the_simulators_camera_motion_path_and_depth() {
     let root = tempfile::tempdir().unwrap();
     let street = street(48, 24.0);
     let tables = write_scene(&street, root.path());
@@ -151,12 +151,12 @@ fn a_scene_has_the_simulator_s_camera_motion_path_and_depth() {
     assert_eq!(serde_json::to_value(&seen).unwrap()["kind"], "nuscenes");
     let scans = seen.streams.iter().find(|s| s.name == "LIDAR_TOP").unwrap();
     assert!((scans.rate_hz.unwrap() - 12.0).abs() < 0.5);
-    let said = text_of(dataset.warnings());
-    assert!(!said.contains("missing"), "{said}");
+    let warnings = text_of(dataset.warnings());
+    assert!(!warnings.contains("missing"), "{warnings}");
 }
 
 #[test]
-fn scenes_and_frames_whose_files_are_elsewhere_are_left_out() {
+fn scenes_and_frames_without_files_are_left_out() {
     let root = tempfile::tempdir().unwrap();
     write_scene(&street(16, 24.0), root.path());
     let frames = open(root.path()).unwrap()[0].frames().to_vec();
@@ -166,8 +166,8 @@ fn scenes_and_frames_whose_files_are_elsewhere_are_left_out() {
     let numbers: Vec<u64> = keyframes.frames().iter().map(|f| f.number).collect();
     assert_eq!(numbers, [0, 6]);
     assert_eq!(keyframes.frames()[1].time_s, frames[6].time_s);
-    let said = text_of(keyframes.warnings());
-    assert!(said.contains("6 of 8 images are missing"), "{said}");
+    let warnings = text_of(keyframes.warnings());
+    assert!(warnings.contains("6 of 8 images are missing"), "{warnings}");
     assert!(
         keyframes
             .ground_truth(1, GtKind::Velodyne)
@@ -201,7 +201,7 @@ fn scenes_and_frames_whose_files_are_elsewhere_are_left_out() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_file_line_and_field() {
+fn errors_name_file_line_and_field() {
     let root = tempfile::tempdir().unwrap();
     let tables = write_scene(&street(4, 24.0), root.path());
     let unknown = "ffffffffffffffffffffffffffffffff".to_owned();

@@ -112,7 +112,7 @@ fn dataset(recording: Messages, track: Option<VehicleTrack>) -> Dataset {
 }
 
 #[test]
-fn images_are_decoded_when_they_are_asked_for() {
+fn images_are_decoded_on_request() {
     let decoded = Arc::new(AtomicUsize::new(0));
     let recording = Messages {
         decoded: Arc::clone(&decoded),
@@ -129,7 +129,7 @@ fn images_are_decoded_when_they_are_asked_for() {
 }
 
 #[test]
-fn an_image_of_another_size_and_missing_speeds_are_reported_by_place() {
+fn errors_name_an_image_of_another_size_and_missing_speeds() {
     let recording = Messages {
         width: 41,
         ..Messages::default()
@@ -150,7 +150,7 @@ fn an_image_of_another_size_and_missing_speeds_are_reported_by_place() {
 }
 
 #[test]
-fn a_layout_warns_in_its_own_words() {
+fn a_layout_can_give_its_own_warnings() {
     let dataset = dataset(Messages::default(), None);
     assert_eq!(dataset.warnings(), &WARNINGS);
     assert_eq!(dataset.warnings()[0].to_string(), "its gyroscope was warm");
@@ -158,7 +158,7 @@ fn a_layout_warns_in_its_own_words() {
 }
 
 #[test]
-fn a_layout_says_which_pixels_are_dynamic() {
+fn a_layout_can_label_dynamic_pixels() {
     let labels = dataset(Messages::default(), None).moving_labels();
     let labels = labels.unwrap().unwrap();
     let truth = DepthMap {

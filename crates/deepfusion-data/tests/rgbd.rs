@@ -30,7 +30,7 @@ fn open(path: &Path) -> Result<Vec<Dataset>, String> {
 }
 
 #[test]
-fn the_published_camera_is_named_but_not_taken() {
+fn the_hint_has_the_published_camera_but_it_is_not_used() {
     let root = tempfile::tempdir().unwrap();
     write_frame(root.path(), 0);
     let text = open(root.path()).unwrap_err();
@@ -38,7 +38,7 @@ fn the_published_camera_is_named_but_not_taken() {
 }
 
 #[test]
-fn depth_and_poses_are_read_and_lost_ones_left_out() {
+fn depth_and_poses_are_read_and_lost_poses_are_left_out() {
     let root = tempfile::tempdir().unwrap();
     let sequence = root.path().join("chess/seq-01");
     for n in 0..5 {

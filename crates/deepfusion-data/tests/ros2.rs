@@ -36,14 +36,14 @@ mod on {
     }
 
     #[test]
-    fn a_folder_of_bags_is_all_of_them() {
+    fn all_bags_of_a_folder_are_opened() {
         let all = Dataset::open(&drive(""), &OpenOptions::default()).unwrap();
         let names: Vec<&str> = all.iter().map(Dataset::name).collect();
         assert_eq!(names, ["drive", "sqlite", "zstd"]);
     }
 
     #[test]
-    fn the_nearest_file_beside_a_bag_counts() {
+    fn the_nearest_file_beside_a_bag_is_used() {
         let folder = tempfile::tempdir().unwrap();
         let bag = folder.path().join("drive.2024");
         std::fs::create_dir(&bag).unwrap();
@@ -69,7 +69,7 @@ mod on {
 
 #[cfg(not(feature = "ros2"))]
 #[test]
-fn without_the_feature_a_bag_says_so() {
+fn without_the_feature_a_bag_is_an_error_that_names_it() {
     for name in ["sqlite", "sqlite/sqlite.db3", "zstd.mcap"] {
         let error = Dataset::open(&drive(name), &OpenOptions::default()).unwrap_err();
         let text = error.to_string();

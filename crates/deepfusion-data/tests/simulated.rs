@@ -29,7 +29,7 @@ fn mark(bag: &Path) {
 }
 
 #[test]
-fn the_mark_goes_from_layout_to_layout() {
+fn conversions_keep_the_simulated_mark() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let bag = bag(root, |_| ());
@@ -46,11 +46,11 @@ fn the_mark_goes_from_layout_to_layout() {
         })
         .unwrap();
         for path in [&bag, &kitti, &again] {
-            let said = (
+            let found = (
                 open(path)[0].is_simulated(),
                 Dataset::all_simulated_at(path),
             );
-            assert_eq!(said, (marked, marked), "{}", path.display());
+            assert_eq!(found, (marked, marked), "{}", path.display());
         }
     }
     assert!(!Dataset::all_simulated_at(&root.join("nowhere")));
@@ -59,7 +59,7 @@ fn the_mark_goes_from_layout_to_layout() {
 /// In a date with real and simulated drives, each drive has its own mark, which is kept in another date. Drives without a mark have the
 /// date's.
 #[test]
-fn drives_of_one_date_are_told_apart() {
+fn drives_of_one_date_have_their_own_marks() {
     let root = tempfile::tempdir().unwrap();
     let root = root.path();
     let bag = bag(root, |_| ());
@@ -90,7 +90,7 @@ fn drives_of_one_date_are_told_apart() {
 
 /// A bag without a mark counts as simulated if it has both topics that cannot be recorded; one of them could be a better sensor's.
 #[test]
-fn exact_motion_and_depth_are_a_simulators() {
+fn a_bag_with_exact_motion_and_depth_is_simulated() {
     type Topics = fn(&mut TinyBag);
     let motion: Topics = |bag| {
         bag.odometry("/truth/odometry", 5.0);
@@ -103,7 +103,7 @@ fn exact_motion_and_depth_are_a_simulators() {
         bag.twist("/truth/odometry", 5.0);
         bag.images("/truth/depth/compressed");
     };
-    for (topics, says, expected) in [
+    for (topics, setting, expected) in [
         (motion, "", false),
         (named, "", false),
         (both, "", true),
@@ -111,13 +111,13 @@ fn exact_motion_and_depth_are_a_simulators() {
     ] {
         let root = tempfile::tempdir().unwrap();
         let bag = bag(root.path(), topics);
-        fs::write(bag.with_extension("toml"), format!("{says}{CAMERA}")).unwrap();
-        assert_eq!(open(&bag)[0].is_simulated(), expected, "{says}");
+        fs::write(bag.with_extension("toml"), format!("{setting}{CAMERA}")).unwrap();
+        assert_eq!(open(&bag)[0].is_simulated(), expected, "{setting}");
     }
 }
 
 #[test]
-fn a_folder_says_it_in_its_file() {
+fn dataset_toml_marks_a_folder_as_simulated() {
     let root = tempfile::tempdir().unwrap();
     folder::write_drive(root.path(), 4, 5.0, 0.0);
     assert!(!open(root.path())[0].is_simulated());
@@ -127,7 +127,7 @@ fn a_folder_says_it_in_its_file() {
 
 /// The mark is found in every layout with such a file, without opening the recording: empty files are enough.
 #[test]
-fn the_file_of_each_layout_is_asked() {
+fn the_mark_is_read_from_the_file_of_each_layout() {
     const DRIVE: &str = "2026_01_01/2026_01_01_drive_0001_sync";
     let within = |name: &str| format!("{DRIVE}/{name}");
     let (image, poses) = (within("image_02/data/0000000000.png"), within("poses.txt"));
@@ -159,23 +159,23 @@ fn the_file_of_each_layout_is_asked() {
         (kitti, &[image, poses, masks], ".", own),
     ];
     let last = layouts.len() - 1;
-    for (number, (kind, files, path, says)) in layouts.into_iter().enumerate() {
+    for (number, (kind, files, path, config)) in layouts.into_iter().enumerate() {
         let root = tempfile::tempdir().unwrap();
         for file in files {
             let file = root.path().join(file);
             fs::create_dir_all(file.parent().unwrap()).unwrap();
             fs::write(file, "").unwrap();
         }
-        let (path, says) = (root.path().join(path), root.path().join(says));
+        let (path, config) = (root.path().join(path), root.path().join(config));
         assert_eq!(Dataset::kind_at(&path).unwrap(), kind);
         for (text, expected) in [
             ("", number == last),
             ("simulated = false\n", false),
             ("simulated = true\n", true),
         ] {
-            fs::write(&says, text).unwrap();
+            fs::write(&config, text).unwrap();
             let found = Dataset::all_simulated_at(&path);
-            assert_eq!(found, expected, "{kind:?} by {}: {text}", says.display());
+            assert_eq!(found, expected, "{kind:?} by {}: {text}", config.display());
         }
     }
 }

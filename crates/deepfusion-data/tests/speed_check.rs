@@ -77,7 +77,7 @@ fn pairs(factor: f64) -> Vec<GroundPair> {
 }
 
 #[test]
-fn a_true_speed_gives_the_cameras_true_height() {
+fn true_speeds_give_the_cameras_true_height() {
     let height = implied_camera_height(&pairs(1.0)).unwrap();
     assert!((height / HEIGHT_M - 1.0).abs() < 0.07, "{height}");
     assert_eq!(SpeedWarning::of_height(height, 6), None);
@@ -112,11 +112,11 @@ fn images_without_information_give_no_height() {
         pair.later = flat;
     }
     assert_eq!(implied_camera_height(&flat), None, "no texture");
-    let mut strangers = pairs(1.0);
-    for (i, pair) in strangers.iter_mut().enumerate() {
+    let mut unrelated = pairs(1.0);
+    for (i, pair) in unrelated.iter_mut().enumerate() {
         pair.earlier = Arc::new(RoadTexture::from(&render(1000.0 * (i + 1) as f64)));
     }
-    assert_eq!(implied_camera_height(&strangers), None, "two places");
+    assert_eq!(implied_camera_height(&unrelated), None, "two places");
     let mut up = pairs(1.0);
     up.iter_mut().for_each(|p| p.down_in_cam = -Vector3::y());
     assert_eq!(
@@ -129,7 +129,7 @@ fn images_without_information_give_no_height() {
 
 /// A still image, although the vehicle moves according to the speeds.
 #[test]
-fn a_frozen_image_is_warned_of() {
+fn a_frozen_image_gives_a_warning() {
     let mut frozen = pairs(1.0);
     frozen.iter_mut().for_each(|p| p.later = p.earlier.clone());
     let height = implied_camera_height(&frozen).unwrap();
@@ -139,7 +139,7 @@ fn a_frozen_image_is_warned_of() {
 
 /// Real drives give no warning, but do when their OXTS speeds are rewritten as km/h.
 #[test]
-fn real_drives_are_distinguished_from_the_same_in_kmh() {
+fn only_real_drives_in_kmh_give_a_warning() {
     for drive in ["2011_09_26_drive_0005_sync", "2011_09_26_drive_0009_sync"] {
         let Some(folder) = common::real_data(&format!("kitti_raw/2011_09_26/{drive}")) else {
             return;

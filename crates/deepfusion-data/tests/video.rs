@@ -94,7 +94,7 @@ fn add_gopro_lens(video: &Path, letter: u8, diagonal_deg: f32) {
 }
 
 #[test]
-fn a_gopros_linear_lens_is_the_camera_and_a_wide_one_is_none() {
+fn a_gopros_camera_is_known_only_with_the_linear_lens() {
     let root = tempfile::tempdir().unwrap();
     for (name, letter) in [("linear", b'L'), ("wide", b'W')] {
         let folder = root.path().join(name);
@@ -118,8 +118,8 @@ fn a_gopros_linear_lens_is_the_camera_and_a_wide_one_is_none() {
                 "{k:?}"
             );
             assert!(!found.camera_assumed());
-            let said = text_of(found.warnings());
-            assert!(said.contains("linear lens of a HERO11 Black"), "{said}");
+            let text = text_of(found.warnings());
+            assert!(text.contains("linear lens of a HERO11 Black"), "{text}");
             assert!(!bends(&given[0]));
             // A given camera takes precedence.
             assert!((given[0].intrinsics(0).fx - 32.0 / 30_f64.to_radians().tan()).abs() < 1e-6);
@@ -187,7 +187,7 @@ fn a_video_gives_its_frames_in_any_order() {
 
 /// comma2k19's videos have no time stamps; the times are in an array beside them.
 #[test]
-fn a_comma_segment_takes_its_frames_times_from_the_log() {
+fn frame_times_of_a_comma_segment_come_from_its_log() {
     let root = tempfile::tempdir().unwrap();
     let codec = [
         "-c:v",
@@ -248,7 +248,7 @@ fn a_comma_segment_takes_its_frames_times_from_the_log() {
 }
 
 #[test]
-fn what_is_no_video_is_an_error() {
+fn files_that_are_not_videos_are_errors() {
     let root = tempfile::tempdir().unwrap();
     let video = root.path().join("x.mp4");
     fs::write(&video, "no video").unwrap();
@@ -265,7 +265,7 @@ fn what_is_no_video_is_an_error() {
 }
 
 #[test]
-fn pictures_become_a_video_at_their_own_times() {
+fn images_are_written_as_a_video_with_their_own_times() {
     let root = tempfile::tempdir().unwrap();
     if encode(root.path(), "there_is_ffmpeg.mp4", &[]).is_none() {
         return;
@@ -310,7 +310,7 @@ fn pictures_become_a_video_at_their_own_times() {
     let before = fs::read(folder.join("drive.mp4")).unwrap();
     for broken in [0, 2] {
         let path = folder.join(&shown[broken].file);
-        let whole = fs::read(&path).unwrap();
+        let original = fs::read(&path).unwrap();
         fs::write(&path, "no picture").unwrap();
         for name in ["drive.mp4", "other.mp4"] {
             let error = made(name).unwrap_err();
@@ -319,7 +319,7 @@ fn pictures_become_a_video_at_their_own_times() {
         fs::remove_file(&path).unwrap();
         let error = made("other.mp4").unwrap_err();
         assert!(error.to_string().contains(&shown[broken].file), "{error}");
-        fs::write(&path, whole).unwrap();
+        fs::write(&path, original).unwrap();
     }
     assert_eq!(fs::read(folder.join("drive.mp4")).unwrap(), before);
     let names = fs::read_dir(&folder)
@@ -331,7 +331,7 @@ fn pictures_become_a_video_at_their_own_times() {
 
 /// As written by `data import`: the video stays in its place, and the tables are in a folder of their own.
 #[test]
-fn a_folder_has_its_own_tables_for_a_video_elsewhere() {
+fn a_folder_may_name_a_video_elsewhere() {
     let root = tempfile::tempdir().unwrap();
     let Some(video) = write_video(root.path(), "drive.mp4") else {
         return;

@@ -16,7 +16,7 @@ fn open(bag: &Path, topics: &[&str]) -> Result<Dataset, Error> {
 }
 
 #[test]
-fn each_camera_s_frames_are_its_own_by_name() {
+fn each_cameras_decoded_frames_have_their_own_folder() {
     if std::process::Command::new("ffmpeg")
         .arg("-version")
         .output()
@@ -61,8 +61,8 @@ fn each_camera_s_frames_are_its_own_by_name() {
     }
     // Frames are decoded again if the bag changes, but not if the file with its settings does.
     let cache = folder.path().join("drive.front.video.frames");
-    let harmed = cache.join("0000000003.jpg");
-    fs::write(&harmed, "broken").unwrap();
+    let damaged = cache.join("0000000003.jpg");
+    fs::write(&damaged, "broken").unwrap();
     fs::write(bag.join("bag.toml"), "scenario = \"urban\"\n").unwrap();
     let front = ["image=/front/video"];
     assert!(open(&bag, &front).unwrap().load_image(3).is_err());

@@ -22,8 +22,8 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     }
     let mut outcome = Outcome::new("blur");
     let usual = median(seen.iter().map(|s| s.1).collect());
-    let whole = Figure::new("sharpness", usual, "", Limit::AtLeast(LEAST));
-    outcome.judge(Severity::Warning, whole, || PicturesReason::Soft);
+    let overall = Figure::new("sharpness", usual, "", Limit::AtLeast(LEAST));
+    outcome.judge(Severity::Warning, overall, || PicturesReason::Soft);
     let blurred: Vec<u64> = seen
         .iter()
         .filter(|(_, sharpness)| *sharpness < BLURRED * usual)

@@ -93,11 +93,11 @@ pub enum NoCameraAhead {
         others_error_s: f64,
     },
     /// The pictures of this drive do not show its offset, and its file gives another one than the others show.
-    SaysOther {
+    GivesOther {
         /// Name of the drive.
         drive: String,
         /// The offset that its file gives, in seconds.
-        said_s: f64,
+        given_s: f64,
         /// Mean offset of the others, in seconds.
         others_s: f64,
     },
@@ -115,7 +115,7 @@ impl NoCameraAhead {
             | Self::Weak { drive, .. }
             | Self::Unsure { drive, .. }
             | Self::Differ { drive, .. }
-            | Self::SaysOther { drive, .. } => Some(drive),
+            | Self::GivesOther { drive, .. } => Some(drive),
             Self::Nothing => None,
         }
     }
@@ -154,10 +154,10 @@ impl NoCameraAhead {
             } => format!(
                 "the clocks are {ahead_s:+.3} ± {std_error_s:.3} s apart, those of the other drives {others_s:+.3} ± {others_error_s:.3} s"
             ),
-            Self::SaysOther {
-                said_s, others_s, ..
+            Self::GivesOther {
+                given_s, others_s, ..
             } => format!(
-                "its file gives a clock offset of {said_s:+.3} s, which its pictures do not show; those of the other drives show {others_s:+.3} s"
+                "its file gives a clock offset of {given_s:+.3} s, which its pictures do not show; those of the other drives show {others_s:+.3} s"
             ),
             Self::Nothing => "no recording was given to compare the clocks of".into(),
         }
@@ -194,7 +194,7 @@ impl Hint for NoCameraAhead {
             Self::Weak { .. } | Self::Unsure { .. } => {
                 "use a longer drive with more bends, or a log with a gyroscope; or give the offset in milliseconds".into()
             }
-            Self::SaysOther { .. } => {
+            Self::GivesOther { .. } => {
                 "if clock.camera_ahead_s in the file beside it is wrong, remove it; otherwise give the recordings one by one".into()
             }
             Self::Differ { .. } => {
@@ -305,7 +305,7 @@ pub struct CommonCameraAhead {
 /// [`camera_ahead`] of drives recorded with one setup. Of two cameras on one clock, only the first is used.
 ///
 /// # Errors
-/// As [`camera_ahead`], if no drive shows it; [`NoCameraAhead::Differ`] and [`NoCameraAhead::SaysOther`] if a drive contradicts the
+/// As [`camera_ahead`], if no drive shows it; [`NoCameraAhead::Differ`] and [`NoCameraAhead::GivesOther`] if a drive contradicts the
 /// others.
 pub fn common_camera_ahead<'a>(
     datasets: impl IntoIterator<Item = &'a Dataset>,
@@ -340,16 +340,16 @@ pub fn common_camera_ahead<'a>(
         });
     }
     for (drive, _) in &unmeasured {
-        let said_s = drive.camera_ahead_s();
-        let said = CameraAhead {
-            ahead_s: said_s,
+        let given_s = drive.camera_ahead_s();
+        let given = CameraAhead {
+            ahead_s: given_s,
             std_error_s: 0.0,
             correlation: 1.0,
         };
-        if said_s != 0.0 && said.apart(&mean) > 1.0 {
-            return Err(NoCameraAhead::SaysOther {
+        if given_s != 0.0 && given.apart(&mean) > 1.0 {
+            return Err(NoCameraAhead::GivesOther {
                 drive: drive.name().to_owned(),
-                said_s,
+                given_s,
                 others_s: mean.ahead_s,
             });
         }

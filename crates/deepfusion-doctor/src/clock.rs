@@ -47,7 +47,7 @@ pub(super) struct Estimate {
     least_s: f64,
 }
 
-/// The offset of the clocks; else why there is none.
+/// The offset of the clocks, or why there is none.
 pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Estimate, ClockSkip> {
     let rates = rates(survey.dataset).filter(|rates| rates.yaw_rate_radps.is_some());
     let rates = rates.ok_or(ClockSkip::NoRates)?;

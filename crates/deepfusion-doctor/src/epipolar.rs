@@ -35,7 +35,7 @@ pub(crate) struct EpipolarPair {
     /// Motion that the vehicle measured.
     pub(crate) earlier_from_later: Se3,
     pub(crate) dt_s: f64,
-    /// The time half way, in seconds on the frames' clock.
+    /// The time halfway between the two images, in seconds on the frames' clock.
     pub(crate) middle_s: f64,
     pub(crate) speed_mps: f64,
 }
@@ -107,10 +107,10 @@ impl EpipolarPair {
         })
     }
 
-    /// The turn that the points show if the camera moved along `direction`; `None` where they do not
+    /// The turn that the points show if the camera moved along `direction`; `None` if they do not
     /// determine one.
     pub(crate) fn turn(&self, direction: &Vector3<f64>, yaw: YawTrust) -> Option<Turn> {
-        let said = self.earlier_from_later.axis_angle();
+        let measured = self.earlier_from_later.axis_angle();
         let tilt = 1.0 / USUAL_TILT.powi(2);
         let hold = Vector3::new(tilt, 1.0 / yaw.0.powi(2), tilt);
         let rows: Vec<(Vector3<f64>, f64)> = self
@@ -122,10 +122,10 @@ impl EpipolarPair {
                 Some((turning(at).transpose() * across, across.dot(by)))
             })
             .collect();
-        let mut omega = said;
+        let mut omega = measured;
         for _ in 0..ROUNDS {
             let mut m = Matrix3::from_diagonal(&hold);
-            let mut y = hold.component_mul(&said);
+            let mut y = hold.component_mul(&measured);
             for (row, moved) in &rows {
                 let residual = (moved - row.dot(&omega)) / self.noise;
                 let weight = 1.0 / (1.0 + residual * residual) / self.noise.powi(2);
@@ -220,7 +220,7 @@ pub(crate) mod tests {
     use super::*;
 
     /// Points of a scene before a camera that moves by `t` and turns by `omega` in a tenth of a second.
-    pub(crate) fn pair(t: Vector3<f64>, omega: Vector3<f64>, said: Se3) -> EpipolarPair {
+    pub(crate) fn pair(t: Vector3<f64>, omega: Vector3<f64>, measured: Se3) -> EpipolarPair {
         let later_from_earlier = Se3::exp(omega, Vector3::zeros());
         let later_from_earlier = Se3::from_axis_angle(later_from_earlier.axis_angle(), t).inverse();
         let points = (0..150).map(|i| {
@@ -234,7 +234,7 @@ pub(crate) mod tests {
         EpipolarPair {
             points: points.collect(),
             noise: NOISE_PX / 200.0,
-            earlier_from_later: said,
+            earlier_from_later: measured,
             dt_s: 0.1,
             middle_s: 0.0,
             speed_mps: 10.0,
@@ -242,21 +242,21 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_direction_that_is_off_is_found() {
+    fn a_wrong_direction_of_travel_is_found() {
         let off = Vector2::new(0.05, -0.03);
         let t = turned(&Vector3::z(), off);
         let omega = Vector3::new(0.002, 0.004, -0.001);
-        let said = Se3::from_axis_angle(Vector3::new(0.0, 0.004, 0.0), Vector3::z());
-        let pairs: Vec<_> = (0..4).map(|_| pair(t, omega, said)).collect();
+        let measured = Se3::from_axis_angle(Vector3::new(0.0, 0.004, 0.0), Vector3::z());
+        let pairs: Vec<_> = (0..4).map(|_| pair(t, omega, measured)).collect();
         let pairs: Vec<_> = pairs.iter().collect();
         let found = heading_error(&pairs, YawTrust(0.001));
         assert!((found - off).norm() < 0.006, "{found}");
     }
 
     #[test]
-    fn points_go_away_from_where_the_camera_heads() {
-        let said = Se3::from_axis_angle(Vector3::zeros(), Vector3::z());
-        let pair = pair(Vector3::z(), Vector3::new(0.003, 0.02, -0.002), said);
+    fn points_move_away_from_the_point_headed_for() {
+        let measured = Se3::from_axis_angle(Vector3::zeros(), Vector3::z());
+        let pair = pair(Vector3::z(), Vector3::new(0.003, 0.02, -0.002), measured);
         let turn = pair.turn(&Vector3::z(), YawTrust(f64::INFINITY)).unwrap();
         assert!(turn.parallax > 0.0);
     }

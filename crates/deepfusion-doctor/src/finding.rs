@@ -5,7 +5,7 @@ use super::skip::SkipReason;
 use serde::{Serialize, Serializer};
 use std::fmt;
 
-/// How bad a finding is.
+/// The severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -46,7 +46,7 @@ pub struct Figure {
 /// Something that is wrong with a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// How bad it is.
+    /// Severity of the finding.
     pub severity: Severity,
     /// The check that found it, such as `clock`.
     pub check: &'static str,
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn who_notes_that_he_could_not_look_did_not_look() {
+    fn a_skipped_check_with_only_a_note_counts_as_not_made() {
         let mut outcome = Outcome::skipped("speed", MotionSkip::NoRoad);
         let unchecked = MotionReason::Unchecked { fastest_mps: 50.0 };
         outcome.find(Severity::Note, None, unchecked);
@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn nan_never_holds() {
+    fn nan_is_outside_every_limit() {
         for limit in [
             Limit::AtMost(1.0),
             Limit::AtLeast(0.0),

@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_followed_where_nothing_is() {
+    fn no_points_are_followed_in_plain_pictures() {
         let plain = GreyImage {
             width: 64,
             height: 48,

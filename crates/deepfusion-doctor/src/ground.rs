@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_looks_down_or_leans_is_told_from_its_opposite() {
+    fn pitch_and_roll_have_the_right_sign() {
         let (sin, cos) = 3.0_f64.to_radians().sin_cos();
         let up = -Vector3::y();
         // Up along the right, lower and front sides of a camera that looks 3 degrees down, and of one that is turned clockwise.
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn no_road_no_plane() {
+    fn without_a_road_there_is_no_plane() {
         assert!(plane(&[], &-Vector3::y()).is_none());
         let wall: Vec<_> = (0..500)
             .map(|i| Vector3::new(0.0, -f64::from(i) * 0.01, 8.0))

@@ -90,7 +90,7 @@ mod tests {
     use image::Rgb;
 
     #[test]
-    fn blur_takes_the_finest_detail() {
+    fn blur_removes_the_finest_detail() {
         let noisy = RgbImage::from_fn(128, 96, |x, y| {
             let v = ((f64::from(x) * 12.9898 + f64::from(y) * 78.233).sin() * 43758.5453).fract();
             Rgb([(128.0 + 100.0 * v) as u8; 3])

@@ -128,14 +128,14 @@ mod tests {
     };
 
     #[test]
-    fn kitti_s_camera_is_one_at_any_size() {
+    fn kitti_s_camera_passes_at_any_size() {
         for (w, h) in [(1242, 375), (640, 192), (320, 96), (416, 128)] {
             assert_eq!(check(&KITTI.resized(w, h)).findings, []);
         }
     }
 
     #[test]
-    fn the_printed_row_of_umad_is_flagged() {
+    fn the_intrinsics_printed_for_umad_are_flagged() {
         let umad = Intrinsics {
             fx: 703.64,
             fy: 724.82,
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_of_another_size_is_named() {
+    fn intrinsics_of_another_image_size_are_named() {
         let wrong = Intrinsics {
             width: 640,
             height: 192,

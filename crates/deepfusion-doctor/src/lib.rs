@@ -2,7 +2,7 @@
 //!
 //! [`doctor`] opens a recording and runs one check after the other. A check measures a figure and compares
 //! it with a limit; a figure outside its limit is a [`Finding`] with a hint. The limits are set so that the clean drives
-//! at hand (KITTI 0005 and 0009, the simulator's five places) pass all of them. What is wrong ([`FindingReason`], which
+//! at hand (KITTI 0005 and 0009, the simulator's five scenes) pass all of them. What is wrong ([`FindingReason`], which
 //! has the hint) and why a check could not be made ([`SkipReason`]) are types, and sentences as text and in JSON.
 
 mod before_training;
@@ -147,12 +147,12 @@ impl Diagnosis {
     /// All findings with the drive they are about, the worst first.
     #[must_use]
     pub fn findings(&self) -> Vec<(Option<&str>, &Finding)> {
-        let whole = self.recording.iter().map(|outcome| (None, outcome));
+        let of_recording = self.recording.iter().map(|outcome| (None, outcome));
         let drives = self.drives.iter().flat_map(|drive| {
             let named = |outcome| (Some(drive.name.as_str()), outcome);
             drive.outcomes.iter().map(named)
         });
-        let mut found: Vec<(Option<&str>, &Finding)> = whole
+        let mut found: Vec<(Option<&str>, &Finding)> = of_recording
             .chain(drives)
             .flat_map(|(name, outcome)| outcome.findings.iter().map(move |f| (name, f)))
             .collect();

@@ -76,7 +76,7 @@ fn outcomes(path: &Path, log: &DriveLog) -> Vec<Outcome> {
         rate(log),
         gaps(log),
         moving(log),
-        sure(log),
+        uncertainty(log),
         turns(log),
         clock(log),
     ]
@@ -151,7 +151,7 @@ fn moving(log: &DriveLog) -> Outcome {
 }
 
 /// How accurate the speeds are, and what that means for training.
-fn sure(log: &DriveLog) -> Outcome {
+fn uncertainty(log: &DriveLog) -> Outcome {
     let moving = log.speeds.iter().filter(|s| s.mps.abs() > MOVING_MPS);
     let shares: Vec<f64> = moving
         .filter_map(|s| Some(100.0 * s.sigma_mps? / s.mps.abs()))

@@ -25,7 +25,7 @@ pub(super) fn failed(why: FindingReason) -> Outcome {
 }
 
 /// The outcome for a recording that can be opened: images that cannot be read, no pair to train on, and what was assumed.
-/// A drive that only has nothing to train on is left out if others of its folder have something, as training does.
+/// A drive whose only fault is that it has no pair to train on is left out, as in training, if other drives of its folder have some.
 pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
     let mut outcome = Outcome::new(CHECK);
     for (number, problem) in &survey.unreadable {

@@ -76,7 +76,7 @@ mod tests {
 
     /// One of each kind with its hint. All messages of a kind are tested beside it.
     #[test]
-    fn a_reason_says_what_its_kind_says() {
+    fn a_reason_has_the_message_and_hint_of_its_kind() {
         let reasons: [FindingReason; 7] = [
             OpeningReason::CourseAlone.into(),
             FramesReason::Backwards { by_s: 0.5 }.into(),
@@ -86,7 +86,7 @@ mod tests {
             LogReason::LocalDates.into(),
             FindingReason::Words("its gyroscope was warm".into()),
         ];
-        let said = [
+        let messages = [
             "no yaw rate was recorded, only a track of positions: the clock can be checked, but not turns and the camera's direction; training \
              takes the turns from the images",
             "its time stamp is 0.500 s earlier than that of the frame before",
@@ -105,9 +105,9 @@ mod tests {
             "give the log's time zone; pictures and speeds show what remains of the clocks' offset",
             "correct what the message names",
         ];
-        for ((reason, said), hint) in reasons.into_iter().zip(said).zip(hints) {
-            assert_eq!(reason.to_string(), said);
-            assert_eq!(serde_json::to_value(&reason).unwrap(), said);
+        for ((reason, message), hint) in reasons.into_iter().zip(messages).zip(hints) {
+            assert_eq!(reason.to_string(), message);
+            assert_eq!(serde_json::to_value(&reason).unwrap(), message);
             assert_eq!(reason.hint(), hint);
         }
     }

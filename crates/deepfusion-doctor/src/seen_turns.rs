@@ -98,8 +98,8 @@ fn turn(
     let passes = if ego.yaw_known() { 1 } else { PASSES };
     let mut seen = None;
     for _ in 0..passes {
-        let said = vehicle.camera0_from_camera1(&ego.cam_from_vehicle);
-        let pair = EpipolarPair::new(&points, &a.intrinsics, said, (from_s, to_s))?;
+        let measured = vehicle.camera0_from_camera1(&ego.cam_from_vehicle);
+        let pair = EpipolarPair::new(&points, &a.intrinsics, measured, (from_s, to_s))?;
         let turn = vehicle_from_cam.rotate(&pair.turn_of_a_pitching_body(&pair.direction()?)?);
         let (roll, pitch, yaw) = Rotation3::from_scaled_axis(turn).euler_angles();
         if !ego.yaw_known() {

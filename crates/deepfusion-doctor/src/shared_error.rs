@@ -61,7 +61,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn two_are_alike_where_they_say_the_same() {
+    fn errors_with_equal_messages_are_equal() {
         let error = |name: &str| {
             let denied = SystemError::from(ErrorKind::PermissionDenied);
             SharedError::from(DataError::file(Path::new(name), denied))

@@ -63,7 +63,7 @@ mod tests {
 
     /// One of each kind. All messages of a kind are tested beside it.
     #[test]
-    fn a_reason_says_what_its_kind_says() {
+    fn a_reason_has_the_message_of_its_kind() {
         let error = Error::file(Path::new("drive"), ErrorKind::NotFound.into());
         let message = error.to_string();
         let reasons: [SkipReason; 8] = [
@@ -76,7 +76,7 @@ mod tests {
             PicturesSkip::NoDetail.into(),
             LogSkip::OwnClock.into(),
         ];
-        let said = [
+        let messages = [
             "the recording cannot be opened",
             message.as_str(),
             "the frames have no time stamps",
@@ -86,9 +86,9 @@ mod tests {
             "no image has any detail",
             "the log is on the camera's own clock",
         ];
-        for (reason, said) in reasons.into_iter().zip(said) {
-            assert_eq!(reason.to_string(), said);
-            assert_eq!(serde_json::to_value(&reason).unwrap(), said);
+        for (reason, message) in reasons.into_iter().zip(messages) {
+            assert_eq!(reason.to_string(), message);
+            assert_eq!(serde_json::to_value(&reason).unwrap(), message);
         }
     }
 }

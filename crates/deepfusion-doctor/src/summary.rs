@@ -27,8 +27,11 @@ impl<'a> CheckSummary<'a> {
             let Some(why) = &outcome.skipped else {
                 continue;
             };
-            let said = why.to_string();
-            match reasons.iter_mut().find(|(one, _)| one.to_string() == said) {
+            let message = why.to_string();
+            match reasons
+                .iter_mut()
+                .find(|(one, _)| one.to_string() == message)
+            {
                 Some((_, drives)) => drives.push(drive),
                 None => reasons.push((why, vec![drive])),
             }
@@ -82,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_check_is_one_over_all_drives_and_so_is_a_reason() {
+    fn checks_and_reasons_are_merged_over_all_drives() {
         let turns = |spread_radps| MotionSkip::HardlyTurns {
             spread_radps,
             needed_radps: 0.015,

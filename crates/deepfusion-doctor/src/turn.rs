@@ -103,10 +103,10 @@ mod tests {
     use deepfusion_geometry::Se3;
 
     /// A vehicle that moves one metre ahead in 0.1 s. Its camera turns at one rate (rad/s, left); it reports another one.
-    fn ahead(seen: f64, said: f64) -> EpipolarPair {
+    fn ahead(seen: f64, reported: f64) -> EpipolarPair {
         let turn = |rate: f64| Vector3::new(0.0, -0.1 * rate, 0.0);
-        let said = Se3::from_axis_angle(turn(said), Vector3::z());
-        pair(Vector3::z(), turn(seen), said)
+        let reported = Se3::from_axis_angle(turn(reported), Vector3::z());
+        pair(Vector3::z(), turn(seen), reported)
     }
 
     /// The outcome for a vehicle that reports this many times the rates at which its camera turns.

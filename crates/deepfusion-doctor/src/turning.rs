@@ -14,7 +14,7 @@ pub(crate) fn turning_as_seen(dataset: &Dataset) -> Option<Dataset> {
     if dataset.yaw_known() || !dataset.tilt_unknown() {
         return None;
     }
-    let stretch = dataset.with_frames(longest_way(dataset)?);
+    let stretch = dataset.with_frames(longest_distance(dataset)?);
     let mut turning = turned(&stretch);
     if stretch.mount_assumed() {
         // The direction of travel needs the turns, and the turns get more accurate with the direction of travel.
@@ -35,26 +35,28 @@ fn turned(dataset: &Dataset) -> Dataset {
 }
 
 /// The [`STRETCH`] frames in a row with the longest distance driven: while the vehicle stands, no road moves. `None` without speeds.
-fn longest_way(dataset: &Dataset) -> Option<Range<usize>> {
+fn longest_distance(dataset: &Dataset) -> Option<Range<usize>> {
     let ego = dataset.ego().ok()?;
     let frames = dataset.frames();
-    let way = |pair: usize| {
+    let distance = |pair: usize| {
         let times = frames[pair].time_s.zip(frames[pair + 1].time_s);
         let motion = times.and_then(|(from_s, to_s)| ego.vehicle_motion(from_s, to_s));
         motion.map_or(0.0, |motion| motion.distance_m.abs())
     };
-    let ways: Vec<f64> = (0..frames.len().saturating_sub(1)).map(way).collect();
-    Some(longest(&ways, STRETCH))
+    let distances: Vec<f64> = (0..frames.len().saturating_sub(1)).map(distance).collect();
+    Some(longest(&distances, STRETCH))
 }
 
 /// The `most` frames in a row with the longest distance, from the distances between neighbouring frames; all if there are no more.
-fn longest(ways: &[f64], most: usize) -> Range<usize> {
-    let frames = ways.len() + 1;
+fn longest(distances: &[f64], most: usize) -> Range<usize> {
+    let frames = distances.len() + 1;
     let length = most.min(frames);
     let last = frames - length;
     let starts = (0..last).step_by((most / 2).max(1)).chain([last]);
-    let way = |start: &usize| ways[*start..start + length - 1].iter().sum::<f64>();
-    let start = starts.max_by(|a, b| way(a).total_cmp(&way(b))).unwrap_or(0);
+    let distance = |start: &usize| distances[*start..start + length - 1].iter().sum::<f64>();
+    let start = starts
+        .max_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap_or(0);
     start..start + length
 }
 
@@ -63,12 +65,12 @@ mod tests {
     use super::longest;
 
     #[test]
-    fn the_stretch_with_the_longest_way_is_read() {
+    fn the_stretch_with_the_longest_distance_is_read() {
         assert_eq!(longest(&[], 4), 0..1);
         assert_eq!(longest(&[1.0; 3], 4), 0..4);
         assert_eq!(longest(&[0.0, 0.0, 0.0, 0.0, 1.0, 1.0], 4), 3..7);
-        let mut ways = [0.0; 20];
-        ways[7..12].fill(1.0);
-        assert_eq!(longest(&ways, 6), 6..12);
+        let mut distances = [0.0; 20];
+        distances[7..12].fill(1.0);
+        assert_eq!(longest(&distances, 6), 6..12);
     }
 }

@@ -51,7 +51,7 @@ fn write_bag(path: &Path) {
 }
 
 #[test]
-fn the_printed_centre_is_taken_and_flagged() {
+fn the_printed_principal_point_is_used_and_flagged() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("umad.bag");
     write_bag(&path);

@@ -73,7 +73,7 @@ impl Activation {
     /// Applies the activation in place.
     ///
     /// # Safety
-    /// `row` must hold `len` values.
+    /// `row` must have `len` values.
     #[inline(always)]
     pub(crate) unsafe fn apply<S: Simd>(self, simd: S, row: *mut f32, len: usize) {
         let whole = len / S::F32_LANES * S::F32_LANES;

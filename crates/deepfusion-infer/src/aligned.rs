@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn more_than_any_memory_holds_is_refused() {
+    fn sizes_beyond_any_memory_are_refused() {
         assert!(Aligned::<f32>::try_zeros(usize::MAX / 4 + 1).is_none());
         assert!(Aligned::<f32>::try_zeros(usize::MAX / 4).is_none());
         let some = Aligned::<f32>::try_zeros(17).unwrap();

@@ -21,7 +21,7 @@ pub(crate) trait ConvForm<E> {
 
     /// Its runs, if it also reads elements that are none of its inputs (`None` as a source). A form's results depend only on its inputs and
     /// the elements listed here.
-    fn reads_on(&self) -> Option<(&Geometry, &Runs)>;
+    fn reads_beyond_inputs(&self) -> Option<(&Geometry, &Runs)>;
 
     /// # Safety
     /// `arena` must contain every view of the geometry, with its border and `overread` elements beyond its buffer. Nobody else may use the
@@ -58,19 +58,19 @@ impl Geometry {
 
     /// Whether the tap at index `k`, along an axis of `n` pixels, ever reads a pixel: a wide kernel's outermost taps may read nothing but
     /// the zeros of the border.
-    fn sees(&self, k: usize, n: usize) -> bool {
+    fn reads_a_pixel(&self, k: usize, n: usize) -> bool {
         let off = k.abs_diff(self.kernel / 2) * self.dilation;
         self.border == Border::Reflect || off < n
     }
 
     /// The kernel's rows with taps that ever read a pixel.
     fn tap_rows(&self) -> impl Iterator<Item = usize> {
-        (0..self.kernel).filter(|ky| self.sees(*ky, self.input.height))
+        (0..self.kernel).filter(|ky| self.reads_a_pixel(*ky, self.input.height))
     }
 
     /// Number of taps that ever read a pixel.
     pub(crate) fn taps(&self) -> usize {
-        let columns = (0..self.kernel).filter(|kx| self.sees(*kx, self.input.width));
+        let columns = (0..self.kernel).filter(|kx| self.reads_a_pixel(*kx, self.input.width));
         self.tap_rows().count() * columns.count()
     }
 
@@ -131,7 +131,7 @@ impl Runs {
         let len = runs.len;
         for ky in g.tap_rows() {
             for kx in (0..g.kernel).step_by(joined) {
-                if joined == 1 && !g.sees(kx, g.input.width) {
+                if joined == 1 && !g.reads_a_pixel(kx, g.input.width) {
                     continue;
                 }
                 for part in 0..whole.div_ceil(len) {
@@ -157,7 +157,7 @@ impl Runs {
         let mut runs = Self::empty(len);
         for first in (0..channel_of.len()).step_by(len) {
             for ky in g.tap_rows() {
-                for kx in (0..g.kernel).filter(|kx| g.sees(*kx, g.input.width)) {
+                for kx in (0..g.kernel).filter(|kx| g.reads_a_pixel(*kx, g.input.width)) {
                     runs.offsets.push(g.tap(ky, kx) + first);
                     let tap = ky * g.kernel + kx;
                     let channel = |c: usize| channel_of.get(c).copied().flatten();
@@ -254,7 +254,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn runs_are_alike_and_fill_up_no_more_than_they_must() {
+    fn runs_have_equal_lengths_and_as_little_padding_as_possible() {
         assert_eq!(run_length(1536, 160, 1), 128);
         assert_eq!(run_length(288, 160, 1), 144);
         assert_eq!(run_length(21, 160, 1), 21);

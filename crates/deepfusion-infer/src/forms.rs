@@ -47,7 +47,7 @@ impl ConvForm<f32> for F32Conv {
     }
 
     /// All are exact: the direct form and the head read their inputs only, Winograd's tiles only pixels of the image and its border.
-    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+    fn reads_beyond_inputs(&self) -> Option<(&Geometry, &Runs)> {
         None
     }
 
@@ -127,12 +127,12 @@ impl ConvForm<Bf16> for Bf16Conv {
         }
     }
 
-    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+    fn reads_beyond_inputs(&self) -> Option<(&Geometry, &Runs)> {
         match self {
-            Self::Amx(conv) => conv.reads_on(),
+            Self::Amx(conv) => conv.reads_beyond_inputs(),
             // The head reads its inputs only, Winograd's tiles only pixels of the image and its border.
             Self::Head(_) | Self::Winograd(_) => None,
-            Self::Dot(conv) => conv.reads_on(),
+            Self::Dot(conv) => conv.reads_beyond_inputs(),
         }
     }
 
@@ -179,7 +179,7 @@ impl ConvForm<Bf16> for Unwritten {
         match *self {}
     }
 
-    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+    fn reads_beyond_inputs(&self) -> Option<(&Geometry, &Runs)> {
         match *self {}
     }
 

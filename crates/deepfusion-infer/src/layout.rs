@@ -77,7 +77,7 @@ impl Layout {
     }
 
     /// Whether a value is stored in a concatenation, from channel `first` on.
-    pub(crate) fn lies_in(&self, part: ValueId, concat: ValueId, first: usize) -> bool {
+    pub(crate) fn is_stored_in(&self, part: ValueId, concat: ValueId, first: usize) -> bool {
         let (part, concat) = (&self.homes[part.0], &self.homes[concat.0]);
         part.buffer == concat.buffer && part.first == concat.first + first
     }

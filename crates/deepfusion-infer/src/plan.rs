@@ -340,7 +340,7 @@ fn outline(layout: &mut Layout, graph: &Graph) -> Vec<Outline> {
                 for (part, in_place) in parts(graph, value) {
                     if !in_place {
                         steps.push(Outline::Upsample(part, value));
-                    } else if !layout.lies_in(part, value, first) {
+                    } else if !layout.is_stored_in(part, value, first) {
                         steps.push(Outline::Copy(part, value, first));
                     }
                     layout.used(part, steps.len() - 1);

@@ -133,9 +133,9 @@ impl Histogram {
         let mut best = (f64::INFINITY, ends);
         for low in tried(ends[0]) {
             for high in tried(ends[1]) {
-                let lost = lost(&values, [low, high]);
-                if lost < best.0 {
-                    best = (lost, [low, high]);
+                let error = rounding_error(&values, [low, high]);
+                if error < best.0 {
+                    best = (error, [low, high]);
                 }
             }
         }
@@ -144,7 +144,7 @@ impl Histogram {
 }
 
 /// Error of the 255 steps of a range, as a sum of squares over the values.
-fn lost(values: &[(f64, f64)], [low, high]: [f64; 2]) -> f64 {
+fn rounding_error(values: &[(f64, f64)], [low, high]: [f64; 2]) -> f64 {
     let step = (high - low) / 255.0;
     let rounded = step * step / 12.0;
     let of = |value: f64| match value {
@@ -178,14 +178,14 @@ mod tests {
 
     /// With a million values below 1 and a single one of 100, an end c costs (100 − c)² + 10⁶·(c/255)²/12, which is smallest at c = 43.9.
     #[test]
-    fn what_is_rare_and_great_is_cut_off() {
+    fn rare_large_values_are_clipped() {
         let many = (0..1_000_000).map(|i| (i % 1000) as f32 * 0.001);
         let [low, high] = range_of(many.chain([100.0]));
         assert!(low == 0.0 && (42.0..46.0).contains(&high), "{low} {high}");
     }
 
     #[test]
-    fn nothing_but_zeros_or_what_is_not_finite_is_a_range_of_zeros() {
+    fn zeros_and_non_finite_values_give_a_range_of_zeros() {
         assert_eq!(range_of([0.0, 0.0].into_iter()), [0.0, 0.0]);
         assert_eq!(range_of([f32::NAN, f32::INFINITY].into_iter()), [0.0, 0.0]);
     }

@@ -17,14 +17,15 @@ pub(crate) fn stale<E: Element, C: ConvForm<E>>(
     steps: &[(String, Step<C>)],
     arena: usize,
 ) -> Vec<Range<usize>> {
-    let reads_on = |step: &Step<C>| matches!(step, Step::Conv(conv) if conv.reads_on().is_some());
-    if !steps.iter().any(|(_, step)| reads_on(step)) {
+    let reads_beyond_inputs =
+        |step: &Step<C>| matches!(step, Step::Conv(conv) if conv.reads_beyond_inputs().is_some());
+    if !steps.iter().any(|(_, step)| reads_beyond_inputs(step)) {
         return Vec::new();
     }
     let mut first_uses = vec![FirstUse::Untouched; arena];
     for (_, step) in steps {
         if let Step::Conv(conv) = step
-            && let Some((geometry, runs)) = conv.reads_on()
+            && let Some((geometry, runs)) = conv.reads_beyond_inputs()
         {
             idle(geometry, runs, |at| {
                 if first_uses[at] == FirstUse::Untouched {

@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_lies_beyond_the_arena_is_not_handed_out() {
+    fn accesses_beyond_the_arena_panic() {
         let mut numbers = [1.0_f32, 2.0, 3.0];
         let arena = Shared::new(&mut numbers);
         // SAFETY: one thread, one slice at a time.

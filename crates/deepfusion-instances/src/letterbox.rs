@@ -121,7 +121,7 @@ mod tests {
     use image::Rgb;
 
     #[test]
-    fn places_go_there_and_back_and_colours_in_their_order() {
+    fn points_map_back_and_colours_keep_their_order() {
         let image = RgbImage::from_pixel(200, 100, Rgb([255, 0, 51]));
         let middle = Letterbox::new([200, 100], [64, 64], Colours::RgbToOne);
         assert_eq!((middle.scale, middle.offset), ([0.32; 2], [0.0, 16.0]));

@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_read_as_they_are_written() {
+    fn names_are_parsed_from_the_metadata() {
         let names = of_note("{0: 'car', 2: \"driver's cab\"}").unwrap();
         assert_eq!(names, ["car", "", "driver's cab"]);
         assert_eq!(of_note("{}"), Some(Vec::new()));

@@ -12,12 +12,12 @@ fn fixture(name: &str) -> PathBuf {
 }
 
 /// Without a library no model can be run; shapes and masks have tests that need none.
-fn library_is_there() -> bool {
-    let there = find(None).is_ok();
-    if !there {
+fn has_library() -> bool {
+    let found = find(None).is_ok();
+    if !found {
         eprintln!("no ONNX Runtime library on this machine: not tested");
     }
-    there
+    found
 }
 
 /// Grey, with a red rectangle to the left and one to the right.
@@ -30,8 +30,8 @@ fn picture() -> RgbImage {
 }
 
 #[test]
-fn red_things_are_found_with_their_pixels() {
-    if !library_is_there() {
+fn red_rectangles_are_found_with_their_pixels() {
+    if !has_library() {
         return;
     }
     let load = |limits| InstanceModel::load(&fixture("red_things"), None, 1, limits);
@@ -78,11 +78,11 @@ fn red_things_are_found_with_their_pixels() {
 }
 
 #[test]
-fn other_models_and_other_files_are_named() {
+fn unusable_models_and_files_are_named() {
     let load = |path: PathBuf| InstanceModel::load(&path, None, 1, Limits::default()).unwrap_err();
     let missing = load(fixture("missing"));
     assert!(matches!(missing, Error::File { .. }) && missing.to_string().contains("missing.onnx"));
-    if !library_is_there() {
+    if !has_library() {
         return;
     }
     let depth = load(fixture("no_detector"));

@@ -119,18 +119,18 @@ fn check(name: &str, kind: Kind, colours: Colours) -> usize {
 }
 
 #[test]
-fn masks_are_those_of_ultralytics() {
+fn masks_match_ultralytics() {
     assert!(check("columns", Kind::Columns, Colours::RgbToOne) > 6);
     assert!(check("final", Kind::Final, Colours::RgbToOne) > 6);
 }
 
 #[test]
-fn boxes_are_those_of_yolox() {
+fn boxes_match_yolox() {
     assert!(check("grid_rows", Kind::GridRows, Colours::Bgr) > 6);
 }
 
 #[test]
-fn numbers_that_are_none_make_no_candidates() {
+fn values_that_are_not_finite_give_no_candidates() {
     let layout = Layout::of([64, 96], &[vec![1, 7, 126]]).unwrap();
     let mut values = vec![0.0; 7 * 126];
     for i in 0..126 {

@@ -148,7 +148,7 @@ mod tests {
 
     /// Without a gradient, a parameter shrinks by the factor 1 − αλ, whatever its value, and the moments stay.
     #[test]
-    fn weights_decay_apart_from_the_gradient() {
+    fn weight_decay_does_not_depend_on_the_gradient() {
         let (mut p, mut m, mut v) = ([1.0_f32, -200.0], [0.0; 2], [0.0; 2]);
         let step = AdamStep {
             learning_rate: 0.1,
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sum_of_squares_is_one() {
+    fn the_sum_of_squares_is_exact() {
         let values: Vec<f32> = (0..70_001).map(|i| (i % 10) as f32).collect();
         let exact: f64 = values.iter().map(|v| f64::from(*v).powi(2)).sum();
         assert_eq!(sum_of_squares(&values), exact);

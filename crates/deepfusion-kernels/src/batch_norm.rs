@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_stays_none() {
+    fn nan_stays_nan() {
         for relu in [false, true] {
             let mut y = [0.0; 4];
             batch_norm(

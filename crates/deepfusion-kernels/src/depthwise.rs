@@ -235,7 +235,7 @@ mod tests {
     /// The gradient of a sum of products is exact here: ∂/∂a of Σ a·b·g is Σ b·g. It equals finite differences, which another test below
     /// checks.
     #[test]
-    fn values_and_gradients_are_those_of_the_definition() {
+    fn values_and_gradients_equal_the_definition() {
         for shape in shapes() {
             let len = BATCH * shape.channels * shape.area();
             let (x, grad) = (noise32(len, 1), noise32(len, 2));

@@ -40,7 +40,7 @@ mod tests {
     use crate::noise::noise;
 
     #[test]
-    fn sums_in_lanes_are_the_sums() {
+    fn sums_in_lanes_equal_plain_sums() {
         let (a, b) = (noise(1001, 3), noise(1001, 4));
         let exact: f64 = a.iter().sum();
         assert!((sum(&a) - exact).abs() < 1e-10);

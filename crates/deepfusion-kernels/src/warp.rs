@@ -27,19 +27,19 @@ const LANES: usize = 16;
 /// The number type of coordinates and pixels.
 ///
 /// # Safety
-/// [`Self::whole`] must return the integer part: pixels are then read without a check.
+/// [`Self::integer_part`] must return the integer part: pixels are then read without a check.
 pub unsafe trait WarpFloat: Float + Send + Sync {
     /// The integer part.
     ///
     /// # Safety
     /// The number must be finite and within the range of an `i32`. (The checked conversion is not vectorised.)
-    unsafe fn whole(self) -> i32;
+    unsafe fn integer_part(self) -> i32;
 }
 
 // SAFETY: the conversion truncates the fraction.
 unsafe impl WarpFloat for f32 {
     #[inline(always)]
-    unsafe fn whole(self) -> i32 {
+    unsafe fn integer_part(self) -> i32 {
         // SAFETY: guaranteed by the caller.
         unsafe { self.to_int_unchecked() }
     }
@@ -48,7 +48,7 @@ unsafe impl WarpFloat for f32 {
 // SAFETY: as above.
 unsafe impl WarpFloat for f64 {
     #[inline(always)]
-    unsafe fn whole(self) -> i32 {
+    unsafe fn integer_part(self) -> i32 {
         // SAFETY: guaranteed by the caller.
         unsafe { self.to_int_unchecked() }
     }
@@ -134,7 +134,7 @@ fn axis<T: WarpFloat>(p: &[T; LANES], size: usize) -> ([i32; LANES], [T; LANES],
     }
     for l in 0..LANES {
         // SAFETY: between 0 and the last pixel.
-        index[l] = unsafe { low[l].whole() };
+        index[l] = unsafe { low[l].integer_part() };
     }
     for l in 0..LANES {
         let moves = p[l] >= T::zero() && p[l] <= last;

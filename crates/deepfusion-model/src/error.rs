@@ -114,7 +114,7 @@ pub enum Error {
         reason: CheckpointLacks,
     },
     /// A network that cannot predict: its encoder was imported, and the rest was never trained.
-    #[error("{path}: only the encoder is trained (imported weights)")]
+    #[error("{path}: only the encoder has trained weights (imported)")]
     EncodersOnly {
         /// Path of the file.
         path: PathBuf,

@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_survives_its_file_and_counts_for_its_step_alone() {
+    fn a_calibration_is_read_back_for_its_own_step_only() {
         let run = tempfile::tempdir().unwrap();
         assert_eq!(Int8Calibration::of_run(run.path(), 7).unwrap(), None);
         let ranges = [("encoder.layer1.0.conv1".to_owned(), [-0.5, 3.25])].into();

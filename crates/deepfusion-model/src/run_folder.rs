@@ -334,7 +334,7 @@ mod tests {
 
     /// A run without the table `[findings]`, from an older version: it is read as is, and rewritten without loss.
     #[test]
-    fn a_run_of_before_keeps_its_camera() {
+    fn an_older_run_keeps_its_camera() {
         let at = tempfile::tempdir().unwrap();
         let folder = RunFolder::create(&at.path().join("run")).unwrap();
         let mut config = Preset::Tiny.config();

@@ -107,7 +107,7 @@ mod tests {
 
     /// Each data set keeps its name and its depth range, but not its paths.
     #[test]
-    fn data_sets_keep_their_metres() {
+    fn data_sets_keep_their_depth_ranges() {
         let mut config = Preset::Tiny.config();
         config.data = toml::from_str(
             "sets = [{ name = 'road', paths = ['/road'] }, { name = 'hall', paths = ['/hall'], range = { min_m = 0.2, max_m = 10.0 } }]",

@@ -141,7 +141,7 @@ fn a_basic_block_network() {
 
 /// The uncertainty head is a second output, and depth is the same as without the head.
 #[test]
-fn a_network_that_says_how_sure_it_is() {
+fn a_network_with_an_uncertainty_head() {
     let config = DepthNetConfig {
         uncertainty: true,
         ..DepthNetConfig::new(ResNetDepth::ResNet18)
@@ -230,7 +230,7 @@ fn disp_net() {
 }
 
 #[test]
-fn lite_mono_that_says_how_sure_it_is() {
+fn lite_mono_with_an_uncertainty_head() {
     let config = DepthNetConfig {
         uncertainty: true,
         ..DepthNetConfig::lite_mono(LiteMonoSize::Tiny)
@@ -255,7 +255,7 @@ fn lite_mono_that_says_how_sure_it_is() {
 }
 
 #[test]
-fn a_narrow_network_whose_channels_fill_no_vector() {
+fn a_network_with_channels_that_do_not_fill_a_vector() {
     let mut config = DepthNetConfig::new(ResNetDepth::ResNet18);
     config.encoder.base_width = 12;
     config.decoder.widths = [40, 24, 20, 10, 6];

@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tiles_stand_where_they_belong() {
+    fn tiles_fill_rows_in_order() {
         let red = RgbImage::from_pixel(30, 10, Rgb([255, 0, 0]));
         let blue = RgbImage::from_pixel(30, 10, Rgb([0, 0, 255]));
         let out = sheet(
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn models_stand_in_columns_even_where_a_row_is_short() {
+    fn models_keep_their_columns_after_a_short_row() {
         let of = |colour| RgbImage::from_pixel(60, 20, Rgb(colour));
         let (red, blue) = (of([255, 0, 0]), of([0, 0, 255]));
         let rows = [

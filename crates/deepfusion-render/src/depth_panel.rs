@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_unknown_is_grey_and_another_size_is_named() {
+    fn unknown_depth_is_grey_and_a_wrong_size_is_named() {
         let (three, one) = ([0.25; 96], [0.5; 32]);
         let mut truth = one;
         truth[0] = f32::NAN;

@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_follow_the_map_and_grey_the_picture() {
+    fn colours_show_the_map_over_the_grey_picture() {
         let mut picture = RgbImage::from_pixel(8, 4, Rgb([100; 3]));
         picture.put_pixel(0, 3, Rgb([200; 3]));
         let map = [0.0, 1.0, 0.0, 1.0];
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_outlier_does_not_make_the_range() {
+    fn a_single_outlier_does_not_set_the_range() {
         let mut map = vec![0.5; 200];
         map[0] = 90.0;
         map[1] = -3.0;

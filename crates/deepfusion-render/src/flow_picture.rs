@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_hue_is_the_direction_and_white_stands_still() {
+    fn the_hue_is_the_direction_and_white_means_no_motion() {
         // Right, down, left, and no motion.
         let flow = [4.0, 0.0, -4.0, 0.0, 0.0, 4.0, 0.0, 0.0];
         let (picture, full) = flow_picture(&flow, 4, 1).unwrap();

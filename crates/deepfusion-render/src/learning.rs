@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_last_line_that_was_cut_off_is_forgiven_one_between_is_not() {
+    fn only_the_last_line_may_be_cut_off() {
         let cut = format!("{LOG}3,train,0.");
         assert_eq!(
             LearningLog::parse(&cut).unwrap(),

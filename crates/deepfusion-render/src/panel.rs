@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_of_another_size_are_named() {
+    fn parts_with_a_wrong_size_are_named() {
         let (three, one) = ([0.25; 96], [0.5; 32]);
         let panel = SamplePanel {
             width: 8,

@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_scale_for_both_axes() {
+    fn both_axes_have_the_same_scale() {
         let corner = vec![[0.0, 0.0], [0.0, 56.0], [28.0, 56.0]];
         let svg = TopView::new("a < b").path("truth", corner).to_svg();
         assert!(svg.contains("a &lt; b") && svg.contains(">10 m<"), "{svg}");
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_see_is_still_a_picture() {
+    fn a_view_without_points_is_still_a_picture() {
         for points in [vec![], vec![[1.0, 2.0]], vec![[f64::NAN, 0.0]]] {
             let svg = TopView::new("t").path("truth", points).to_svg();
             assert!(svg.ends_with("</svg>"), "{svg}");
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn bars_are_round() {
+    fn scale_bars_have_round_lengths() {
         for (length, bar) in [
             (0.3, 0.2),
             (1.0, 1.0),

@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_edge_is_of_the_image_that_saw_it() {
+    fn each_edge_is_taken_from_the_better_prediction() {
         let mut blended = vec![1.0; 202];
         blend_flipped(&mut blended, &[3.0; 202], 101);
         let at = |column: usize| blended[column];
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_values_stay_and_one_column_is_a_width() {
+    fn blending_keeps_equal_values_and_images_of_one_column() {
         let mut own = vec![7.5; 101];
         blend_flipped(&mut own, &[7.5; 101], 101);
         assert_eq!(own, vec![7.5; 101]);

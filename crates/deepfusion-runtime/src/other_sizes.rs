@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_packed_for_the_first_sizes_is_shared() {
+    fn packed_weights_of_the_first_sizes_are_shared() {
         let packed = Arc::new(AtomicUsize::new(0));
         let count = Arc::clone(&packed);
         let mut first = OtherSizes::new(move |_| {
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_that_were_packed_at_once_the_first_is_kept() {
+    fn of_two_packed_at_once_the_first_is_kept() {
         let sizes = OtherSizes::new(|_| Ok(Box::new(Idle)));
         let shared = &sizes.shared;
         assert!(shared.publish(size(0), Idle.plan()).is_none());

@@ -230,7 +230,7 @@ mod tests {
 
     /// Only one size fits a narrow image at every scale, so there is one prediction.
     #[test]
-    fn equal_sizes_are_looked_at_once() {
+    fn equal_sizes_are_predicted_once() {
         let preparer = Preparer {
             size: size(320, 96),
             training_camera: None,

@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_plane_stays_one_inside() {
+    fn a_plane_stays_a_plane_away_from_the_border() {
         let value = |x: f32, y: f32| 2.0 * x - 3.0 * y + 1.0;
         let map = |width: usize, height: usize| -> Vec<f32> {
             let centre = |i: usize, n: usize| (i as f32 + 0.5) / n as f32;

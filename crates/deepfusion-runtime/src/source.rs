@@ -131,7 +131,7 @@ impl ModelSource {
                 match (config.assumed_camera, config.learned_camera()) {
                     (None, _) => Ok(None),
                     // Fixed to this one, whatever the cameras of other recordings were.
-                    (Some(held), None) => Ok(Some(held.intrinsics())),
+                    (Some(fixed), None) => Ok(Some(fixed.intrinsics())),
                     (Some(_), Some(_)) => folder.camera_of(&folder.read_state(*kind)?, set),
                 }
             }
@@ -143,7 +143,7 @@ impl ModelSource {
                 })?;
                 Ok(match (config.assumed_camera, config.learned_camera()) {
                     (None, _) => None,
-                    (Some(held), None) => Some(held.intrinsics()),
+                    (Some(fixed), None) => Some(fixed.intrinsics()),
                     (Some(_), Some(_)) => findings.camera_of(&config, set),
                 })
             }
@@ -177,14 +177,14 @@ pub fn embedded(model: &Path) -> Result<Option<Box<Shipped>>, deepfusion_weights
 pub fn embedded_unless_run(
     model: &Path,
 ) -> Result<Option<Box<Shipped>>, deepfusion_weights::Error> {
-    if holds_a_run(model) {
+    if contains_run(model) {
         return Ok(None);
     }
     embedded(model)
 }
 
 /// Whether a folder contains a run, or the remains of one.
-fn holds_a_run(folder: &Path) -> bool {
+fn contains_run(folder: &Path) -> bool {
     let of_a_run = |path: &Path| path.ends_with("config.toml") || names_a_checkpoint(path);
     let entries = std::fs::read_dir(folder).into_iter().flatten();
     entries.flatten().any(|entry| of_a_run(&entry.path()))
@@ -202,8 +202,8 @@ impl fmt::Display for HiddenByRun {
         let name = self.name;
         write!(
             f,
-            "`{name}` is used as the run in that folder, not as the embedded network: write ./{name} to make that clear, \
-             or rename the folder to use the embedded network"
+            "`{name}` is used as the run in the folder of that name, not as the embedded network: write ./{name} to make that \
+             clear, or rename the folder to use the embedded network"
         )
     }
 }
@@ -213,7 +213,7 @@ impl fmt::Display for HiddenByRun {
 pub fn hidden_by_run(model: &Path) -> Option<HiddenByRun> {
     // Compared as text, not as paths, in which `street/` equals `street`.
     let name = deepfusion_weights::names().find(|name| model.as_os_str() == *name)?;
-    holds_a_run(model).then_some(HiddenByRun { name })
+    contains_run(model).then_some(HiddenByRun { name })
 }
 
 /// The names of the embedded networks.

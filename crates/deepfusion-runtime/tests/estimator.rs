@@ -49,7 +49,7 @@ fn another_estimator_gives_the_same_bits() -> Result {
 
 /// A size that only the second estimator has used is available to the first, too: packing takes time and memory.
 #[test]
-fn estimators_share_what_is_packed_for_each_size() -> Result {
+fn estimators_share_the_packed_weights_of_each_size() -> Result {
     let packed = Arc::new(AtomicUsize::new(0));
     let network = ModelSource::named("tiny".as_ref())?.load(None)?;
     let count = Arc::clone(&packed);
@@ -70,7 +70,7 @@ fn estimators_share_what_is_packed_for_each_size() -> Result {
 
 /// Both threads pack the size, neither waits for the other, and both then use the first result.
 #[test]
-fn a_size_may_come_to_two_threads_at_once() -> Result {
+fn two_threads_may_pack_a_size_at_once() -> Result {
     let network = ModelSource::named("tiny".as_ref())?.load(None)?;
     let (own, meet) = (network.config.size, Barrier::new(2));
     let mut first = DepthEstimator::of(network, move |config, weights| {
@@ -122,7 +122,7 @@ fn tasks_of_a_pool_may_all_predict() -> Result {
 }
 
 #[test]
-fn a_buffer_is_used_again_whatever_it_held() -> Result {
+fn a_reused_buffer_is_overwritten() -> Result {
     let mut estimator = tiny()?;
     let mut depth = DepthMap::empty(3, 5);
     for (width, height) in [(640, 192), (160, 96), (320, 96)] {
@@ -158,7 +158,7 @@ fn an_image_of_another_size_is_refused() -> Result {
 }
 
 #[test]
-fn a_name_that_is_none_says_which_there_are() {
+fn an_unknown_name_is_refused_with_the_known_ones() {
     let error = ModelSource::named(Path::new("no-such-network")).unwrap_err();
     assert!(error.to_string().contains("no-such-network"), "{error}");
     assert!(error.hint().is_some_and(|hint| hint.contains("street")));
@@ -180,7 +180,7 @@ fn augmented(
 }
 
 #[test]
-fn several_looks_give_their_mean() -> Result {
+fn several_predictions_give_their_mean() -> Result {
     let mut estimator = tiny()?;
     let image = picture(640, 480, 4);
     let at = |estimator: &mut DepthEstimator, scales| {
@@ -217,7 +217,7 @@ fn several_looks_give_their_mean() -> Result {
 
 /// With the mirrored image among the predictions, the depth of a mirrored image is the mirrored depth.
 #[test]
-fn a_mirrored_image_is_seen_mirrored() -> Result {
+fn a_mirrored_image_has_a_mirrored_depth() -> Result {
     let mut estimator = DepthEstimator::load("street")?;
     let image = picture(640, 192, 6);
     let mirrored = image::imageops::flip_horizontal(&image);
@@ -249,7 +249,7 @@ fn a_mirrored_image_is_seen_mirrored() -> Result {
 
 /// Equal to the prediction of the mirrored picture, up to rounding when resizing.
 #[test]
-fn a_mirrored_prediction_lies_beside_the_images_own() -> Result {
+fn a_mirrored_prediction_is_mirrored_back() -> Result {
     let mut estimator = DepthEstimator::load("street")?;
     let image = picture(640, 192, 7);
     let k = camera(640, 192);
@@ -281,7 +281,7 @@ fn a_mirrored_prediction_lies_beside_the_images_own() -> Result {
 }
 
 #[test]
-fn a_network_of_one_camera_takes_one_size() -> Result {
+fn a_network_of_one_camera_has_one_size() -> Result {
     let mut network = ModelSource::named(Path::new("tiny"))?.load(None)?;
     network.config.canonical_focal_px = None;
     let mut estimator = DepthEstimator::fused(network, Precision::F32)?;

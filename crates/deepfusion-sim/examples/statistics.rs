@@ -78,11 +78,11 @@ fn small(picture: &DynamicImage) -> RgbImage {
 fn report(name: &str, pictures: &[RgbImage]) {
     println!("{name}: {} pictures", pictures.len());
     let measured: Vec<[f64; 12]> = pictures.iter().map(measure).collect();
-    for (i, what) in NAMES.iter().enumerate() {
+    for (i, quantity) in NAMES.iter().enumerate() {
         let mut values: Vec<f64> = measured.iter().map(|m| m[i]).collect();
         values.sort_by(f64::total_cmp);
         let [low, middle, high] = [0.1, 0.5, 0.9].map(|q| percentile(&values, q));
-        println!("  {what:<18} {low:8.2} {middle:8.2} {high:8.2}");
+        println!("  {quantity:<18} {low:8.2} {middle:8.2} {high:8.2}");
     }
 }
 

@@ -13,7 +13,7 @@ pub enum Scene {
     Urban,
     /// An enclosed park: a narrow road between lawns and trees, few cars, slowly driven.
     Park,
-    /// A car park under ground: dark, near walls, pillars, a low ceiling, at walking speed.
+    /// An underground car park: dark, near walls, pillars, a low ceiling, at walking speed.
     Garage,
     /// A shopping street: large houses on both sides, wide pavements, many parked cars.
     Commercial,
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_varied_drive_cannot_have_is_named() {
+    fn settings_that_a_varied_drive_cannot_have_are_named() {
         let varied = || SimConfig {
             varied: true,
             ..SimConfig::default()
@@ -400,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_scene_says_what_there_is() {
+    fn the_error_for_an_unknown_scene_lists_the_known_ones() {
         let error = "moon".parse::<Scene>().unwrap_err();
         assert_eq!(
             error.to_string(),

@@ -266,7 +266,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_stamps_run_over_minutes_and_days() {
+    fn time_stamps_carry_over_to_minutes_and_days() {
         assert_eq!(timestamp(0.1), "2026-01-01 12:00:00.100000000");
         assert_eq!(timestamp(3725.5), "2026-01-01 13:02:05.500000000");
         assert_eq!(timestamp(12.0 * 3600.0), "2026-01-02 00:00:00.000000000");

@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_car_moves_where_it_points() {
+    fn the_car_moves_along_its_heading() {
         let (road, drive) = drive(4, 40.0);
         for step in 0..400 {
             let time = f64::from(step) * 0.1;
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn it_starts_at_the_beginning() {
+    fn the_drive_starts_at_zero_metres() {
         assert!(drive(9, 5.0).1.progress(0.0).0.abs() < 1e-9);
     }
 }

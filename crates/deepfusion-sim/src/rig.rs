@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_roof_s_sensors_are_where_the_paper_has_them() {
+    fn the_roof_s_sensors_are_placed_as_in_the_paper() {
         let rig = Rig::umad_like(CAMERA_HEIGHT);
         let lidar_from_cam = rig.cam_from_velo().inverse();
         let above = lidar_from_cam.translation();
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_camera_stays_where_it_is() {
+    fn turning_the_camera_keeps_its_position() {
         for level in [Rig::kitti_like(1.2), Rig::umad_like(1.2)] {
             let turned = level.with_camera_turned(0.1, 0.05);
             let (before, after) = (

@@ -466,7 +466,7 @@ mod tests {
     }
 
     #[test]
-    fn a_side_street_opens_the_kerb() {
+    fn the_kerb_is_open_at_a_side_street() {
         let mut road = road(5);
         road.add_side_street(SideStreet {
             s: 100.0,

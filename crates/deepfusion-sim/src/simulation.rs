@@ -110,11 +110,11 @@ impl Simulation {
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x7AFF_1C00);
         let mut traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);
         if config.varied {
-            traffic.keep_passing(&world, &drive, &looked_at(&times));
+            traffic.keep_passing(&world, &drive, &observation_times(&times));
         }
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x0B1C_E5A0);
-        let way = (&drive, duration_s);
-        let riders = Riders::along(&mut rng, &world, &people, way, &traffic, config.riders);
+        let driven = (&drive, duration_s);
+        let riders = Riders::along(&mut rng, &world, &people, driven, &traffic, config.riders);
         let (width, height) = (config.width, config.height);
         let above_road = look.as_ref().map(DriveLook::height_m);
         let above_road = above_road.unwrap_or(config.camera_height_m);
@@ -428,7 +428,7 @@ fn frame_times(rng: &mut ChaCha8Rng, config: &SimConfig) -> Vec<f64> {
 }
 
 /// Times at which the drive is observed, seconds: its frames, and the scans of a bag.
-fn looked_at(frames: &[f64]) -> Vec<f64> {
+fn observation_times(frames: &[f64]) -> Vec<f64> {
     let end_s = frames.last().copied().unwrap_or_default();
     let scans = (0u32..)
         .map(|scan| f64::from(scan) / SCAN_RATE_HZ)
@@ -441,16 +441,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scans_between_frames_are_looked_at() {
-        let found = looked_at(&[0.0, 0.25]);
+    fn the_times_of_scans_between_frames_are_included() {
+        let found = observation_times(&[0.0, 0.25]);
         assert_eq!(found, [0.0, 0.25, 0.0, 0.1, 0.2]);
-        let found = looked_at(&[0.0, 0.3]);
+        let found = observation_times(&[0.0, 0.3]);
         assert_eq!(found, [0.0, 0.3, 0.0, 0.1, 0.2, 0.3]);
     }
 
     /// A car ahead of the camera at one scan is also there at the next one, although frames are half a second apart.
     #[test]
-    fn no_car_vanishes_from_scan_to_scan() {
+    fn no_car_disappears_from_scan_to_scan() {
         let simulation = Simulation::new(&SimConfig {
             seed: 2,
             frames: 8,

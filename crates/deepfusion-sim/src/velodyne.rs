@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_lines_go_down() {
+    fn elevations_decrease_from_line_to_line() {
         let lines = elevations();
         assert!(lines.windows(2).all(|w| w[1] < w[0]));
         assert!((lines[63].to_degrees() + 24.33).abs() < 1e-3);

@@ -201,7 +201,7 @@ fn oxts_integrates_to_the_poses() {
 
 /// The camera's displacement includes the lever arm from the IMU, and its height stays the same.
 #[test]
-fn the_camera_rides_at_its_height() {
+fn the_camera_keeps_its_height() {
     let simulation = drive(SimConfig {
         frames: 100,
         ..SimConfig::default()
@@ -248,7 +248,7 @@ fn depths_are_those_of_a_street() {
 
 /// The camera never drives through an object, and moving boxes move by their velocity.
 #[test]
-fn nothing_is_driven_through() {
+fn the_camera_drives_through_no_object() {
     for seed in [31, 32, 33] {
         let simulation = drive(SimConfig {
             seed,

@@ -29,8 +29,8 @@ fn found<'a>(diagnosis: &'a Diagnosis, check: &str, quantity: &str) -> &'a Findi
     };
     let all = complaints(diagnosis);
     all.iter().copied().find(fits).unwrap_or_else(|| {
-        let said = outcome(diagnosis, check);
-        panic!("no {check} ({quantity}) in {all:#?}, but {said:#?}")
+        let other = outcome(diagnosis, check);
+        panic!("no {check} ({quantity}) in {all:#?}, but {other:#?}")
     })
 }
 
@@ -83,7 +83,7 @@ fn bag_of(folder: &Path, config: &SimConfig, settings: BagSettings) -> PathBuf {
 }
 
 #[test]
-fn every_place_is_clean() {
+fn every_scene_is_clean() {
     for scene in Scene::ALL {
         let folder = tempfile::tempdir().unwrap();
         let simulation = Simulation::new(&config(scene, 100)).unwrap();
@@ -117,7 +117,7 @@ fn every_place_is_clean() {
 }
 
 #[test]
-fn every_place_is_clean_as_a_bag() {
+fn every_scene_is_clean_as_a_bag() {
     for scene in Scene::ALL {
         let folder = tempfile::tempdir().unwrap();
         let diagnosis = doctor(
@@ -208,7 +208,7 @@ fn a_scaled_focal_length_is_measured_by_the_turns() {
 }
 
 #[test]
-fn a_matrix_of_another_size_is_named() {
+fn intrinsics_of_another_image_size_are_named() {
     let drive = Drive::clean();
     // The images have 320x96 pixels. These intrinsics are for 640x192, but still lie in the image.
     drive.camera(|k| {
@@ -228,7 +228,7 @@ fn a_matrix_of_another_size_is_named() {
 }
 
 #[test]
-fn kilometres_an_hour_are_found_by_the_road() {
+fn the_road_reveals_speeds_in_kilometres_per_hour() {
     let drive = Drive::clean();
     drive.oxts(|_, values| {
         for i in [oxts::VF, oxts::VL, oxts::VN, oxts::VE] {
@@ -247,7 +247,7 @@ fn kilometres_an_hour_are_found_by_the_road() {
 
 /// Without roll and pitch rates, eight seconds of bends do not determine the clock offset. The check is then skipped rather than guessing.
 #[test]
-fn a_clock_that_bends_alone_cannot_place_is_left_open() {
+fn an_uncertain_clock_offset_is_skipped() {
     let drive = Drive::clean();
     drive.camera_clock_ahead(0.3);
     let diagnosis = drive.diagnose();
@@ -256,7 +256,7 @@ fn a_clock_that_bends_alone_cannot_place_is_left_open() {
 }
 
 #[test]
-fn mirrored_images_turn_the_other_way() {
+fn mirrored_images_are_reported() {
     let drive = Drive::clean();
     drive.images(|_, image| image::imageops::flip_horizontal_in_place(image));
     let diagnosis = drive.diagnose();
@@ -287,7 +287,7 @@ fn a_wrong_camera_and_wrong_turns_are_found_before_training() {
 }
 
 #[test]
-fn a_camera_that_is_pitched_heads_elsewhere() {
+fn a_pitched_camera_is_reported() {
     let drive = Drive::clean();
     drive.pitch_vehicle(3.0);
     let diagnosis = drive.diagnose();
@@ -346,7 +346,7 @@ fn a_jumping_exposure_is_counted() {
 }
 
 #[test]
-fn an_ego_vehicle_in_view_is_measured_and_cut() {
+fn a_hood_is_measured_and_a_crop_proposed() {
     let drive = Drive::clean();
     drive.images(|_, image| {
         let (width, height) = image.dimensions();
@@ -371,7 +371,7 @@ fn an_ego_vehicle_in_view_is_measured_and_cut() {
 }
 
 #[test]
-fn a_black_frame_is_measured_and_cut() {
+fn a_black_border_is_measured_and_a_crop_proposed() {
     let drive = Drive::clean();
     drive.images(|_, image| {
         let width = image.width();
@@ -401,11 +401,11 @@ fn cameras_that_are_swapped_are_reported() {
     let drive = Drive::clean();
     drive.second_camera(-6);
     let right = drive.diagnose();
-    let said = &right.recording[0];
-    assert_eq!(said.check, "stereo");
+    let stereo = &right.recording[0];
+    assert_eq!(stereo.check, "stereo");
     assert!(
-        said.skipped.is_none() && said.findings.is_empty(),
-        "{said:?}"
+        stereo.skipped.is_none() && stereo.findings.is_empty(),
+        "{stereo:?}"
     );
 
     let drive = Drive::clean();
@@ -418,7 +418,7 @@ fn cameras_that_are_swapped_are_reported() {
 }
 
 #[test]
-fn frames_between_which_hardly_anything_moves_are_reported() {
+fn frames_with_little_parallax_are_reported() {
     let drive = Drive::clean();
     // All objects are far away: from frame to frame the image grows by a fifth of a thousandth.
     let far = std::sync::Mutex::new(None);
@@ -439,7 +439,7 @@ fn frames_between_which_hardly_anything_moves_are_reported() {
 }
 
 #[test]
-fn standing_parts_are_counted() {
+fn stretches_at_standstill_are_counted() {
     let drive = Drive::clean();
     drive.oxts(|i, values| {
         if i < 40 {
@@ -500,7 +500,7 @@ fn a_damaged_image_is_named() {
 }
 
 #[test]
-fn what_lies_beside_the_drives_is_given_by_its_own_path() {
+fn files_beside_the_drives_are_noted() {
     let folder = tempfile::tempdir().unwrap();
     let simulation = Simulation::new(&config(Scene::Urban, 12)).unwrap();
     let root = folder.path().join("kitti");
@@ -520,7 +520,7 @@ fn what_lies_beside_the_drives_is_given_by_its_own_path() {
 }
 
 #[test]
-fn what_cannot_be_opened_is_a_finding() {
+fn a_recording_that_cannot_be_opened_is_a_finding() {
     let folder = tempfile::tempdir().unwrap();
     let diagnosis = doctor(folder.path(), None);
     assert_eq!(diagnosis.worst(), Some(Severity::Error));
@@ -568,15 +568,15 @@ fn a_gap_in_the_speed_is_reported_with_its_frame() {
 
 /// A recorder without drops: its log ends before the images do.
 #[test]
-fn a_log_that_ends_early_is_told_from_one_with_gaps() {
+fn a_log_that_ends_early_is_distinguished_from_one_with_gaps() {
     let drive = Drive::clean();
     let images = drive.open().frames().len();
     drive.remove_oxts(images - 8..images);
     let diagnosis = drive.diagnose();
     let finding = found(&diagnosis, "timing", "time without a known motion");
-    let said = finding.what.to_string();
-    assert!(said.contains("before the last image"), "{said}");
-    assert!(!said.contains("after the first"), "{said}");
+    let message = finding.what.to_string();
+    assert!(message.contains("before the last image"), "{message}");
+    assert!(!message.contains("after the first"), "{message}");
     assert!(finding.hint.contains("start_s"), "{finding:?}");
 }
 
@@ -607,7 +607,7 @@ fn a_wrong_wheelbase_is_found_by_the_gyro() {
 }
 
 #[test]
-fn a_lidar_that_is_turned_or_pitched_on_the_car_is_found_by_its_velocities() {
+fn radial_velocities_reveal_a_lidar_that_is_turned_or_pitched() {
     let folder = tempfile::tempdir().unwrap();
     let path = bag(folder.path(), Scene::Urban, 200, BagSettings::default());
     let sidecar = path.with_extension("toml");

@@ -68,7 +68,7 @@ fn the_seed_and_the_index_change_the_view() {
 
 /// Views of plain worlds are as in `simulate`; the others are the same as without plain worlds.
 #[test]
-fn plain_worlds_are_put_among_the_others() {
+fn plain_worlds_are_mixed_with_varied_ones() {
     let few = |plain| {
         endless(EndlessConfig {
             worlds_at_once: 8,
@@ -120,7 +120,7 @@ fn eight_neighbours_show_eight_worlds() {
 
 /// No point lies below the ground or beyond it, and every ray that goes down ends at the ground.
 #[test]
-fn depth_is_the_ground_s_where_nothing_stands() {
+fn no_depth_is_beyond_the_ground() {
     let stream = endless(small());
     let (mut on_ground, mut level, mut all) = (0usize, 0usize, 0usize);
     for index in 0..96 {
@@ -248,7 +248,7 @@ fn weather_and_camera_never_touch_the_depth() {
 }
 
 #[test]
-fn views_are_of_many_kinds_and_none_is_stuck() {
+fn views_vary_and_no_camera_touches_an_object() {
     let stream = endless(small());
     let (mut scenes, mut weathers) = (HashSet::new(), HashSet::new());
     let (mut grey, mut moving) = (0, 0);
@@ -322,7 +322,7 @@ fn share(pairs: &[(&View, View)], same: impl Fn(&View, &View) -> bool) -> f64 {
 
 /// Leaving out one ingredient does not change the others.
 #[test]
-fn an_ingredient_is_left_out_alone() {
+fn leaving_out_an_ingredient_keeps_the_others() {
     let heading = |view: &View| {
         let ahead = view.world_from_cam.rotate(&Vector3::z());
         ahead.y.atan2(ahead.x)

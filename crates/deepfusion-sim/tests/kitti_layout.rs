@@ -22,7 +22,7 @@ fn small(frames: usize) -> Simulation {
 }
 
 #[test]
-fn the_reader_finds_what_the_simulator_knows() {
+fn the_reader_finds_the_ground_truth_of_the_simulator() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = folder.path().join("new/drive");
     let simulation = small(6);
@@ -138,7 +138,7 @@ fn equal_configurations_write_equal_bytes() {
 }
 
 #[test]
-fn a_folder_with_something_in_it_is_refused() {
+fn a_folder_that_is_not_empty_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     fs::write(folder.path().join("mine.txt"), "keep").expect("a file");
     let error = write_kitti(&small(1), folder.path(), &mut |_, _| {
@@ -161,7 +161,7 @@ fn an_empty_folder_is_used() {
 }
 
 #[test]
-fn where_nothing_can_be_written_the_path_is_named() {
+fn an_unwritable_path_is_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("a-file");
     fs::write(&file, "not a folder").expect("a file");
@@ -207,7 +207,7 @@ fn a_drive_that_is_stopped_leaves_nothing() {
 }
 
 #[test]
-fn a_drive_that_is_stopped_at_its_last_frame_is_done() {
+fn a_drive_stopped_at_its_last_frame_is_complete() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = folder.path().join("new");
     let drive = write_kitti(&small(2), &out, &mut |_, _| ControlFlow::Break(()));
@@ -220,7 +220,7 @@ fn a_drive_that_is_stopped_at_its_last_frame_is_done() {
 
 /// The error names the final path: the temporary folder is gone by then.
 #[test]
-fn what_cannot_be_written_is_named_by_its_place() {
+fn errors_name_the_final_path() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let error = write_kitti(&small(9), folder.path(), &mut |_, _| {
         let mut entries = fs::read_dir(folder.path()).expect("the folder");
@@ -232,13 +232,13 @@ fn what_cannot_be_written_is_named_by_its_place() {
         ControlFlow::Continue(())
     })
     .expect_err("its folders are gone");
-    let said = error.to_string();
-    assert!(said.contains("2026_01_01_drive_0012_sync"), "{said}");
-    assert!(!said.contains("partial"), "{said}");
+    let message = error.to_string();
+    assert!(message.contains("2026_01_01_drive_0012_sync"), "{message}");
+    assert!(!message.contains("partial"), "{message}");
 }
 
 #[test]
-fn what_another_writes_is_named() {
+fn the_unfinished_folder_of_another_writer_is_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let another = PartialFolder::beside(&folder.path().join("2026_01_01")).expect("a folder");
     let error = write_kitti(&small(1), folder.path(), &mut |_, _| {
@@ -252,7 +252,7 @@ fn what_another_writes_is_named() {
 
 /// Files left by a killed process do not block the next one.
 #[test]
-fn what_a_killed_writer_left_is_removed() {
+fn files_of_a_killed_writer_are_removed() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let left = PartialFolder::beside(&folder.path().join("2026_01_01")).expect("a folder");
     let images = left.path().join("2026_01_01_drive_0012_sync/image_02");

@@ -148,7 +148,7 @@ fn nobody_is_in_a_house_or_in_a_car() {
 }
 
 #[test]
-fn there_is_no_riding_in_garages() {
+fn riders_in_a_garage_are_rejected() {
     let config = SimConfig {
         scene: Scene::Garage,
         ..config(1, 3)

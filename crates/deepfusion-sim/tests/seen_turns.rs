@@ -92,11 +92,12 @@ fn images_show_how_the_vehicle_turned() {
         // With these turns, the camera's motion between images is the true one.
         alone.take_turns(&without_yaw);
         assert!(alone.yaw_known() && !alone.tilt_unknown());
-        let said: Vec<String> = alone.warnings().iter().map(ToString::to_string).collect();
-        let said = said.join("\n");
+        let messages: Vec<String> = alone.warnings().iter().map(ToString::to_string).collect();
+        let messages = messages.join("\n");
         assert!(
-            said.contains("estimating them from the images") && !said.contains("no yaw rate"),
-            "{said}"
+            messages.contains("estimating them from the images")
+                && !messages.contains("no yaw rate"),
+            "{messages}"
         );
         let turned_off: Vec<f64> = (1..60)
             .map(|i| {
@@ -111,9 +112,9 @@ fn images_show_how_the_vehicle_turned() {
     }
 }
 
-/// If the images show nothing, the drive does not change.
+/// If a third of the images show nothing, too few turns are found, and the drive does not change.
 #[test]
-fn turns_that_nothing_shows_are_not_made_up() {
+fn too_few_turns_leave_the_drive_unchanged() {
     let at = tempfile::tempdir().unwrap();
     let truth = drive(&at.path().join("kitti"), Scene::Urban);
     let folder = at.path().join("folder");
@@ -179,7 +180,7 @@ fn a_wrong_unit_is_found_without_a_yaw_rate() {
 
 /// A part of a drive has the images and the motion of its own frames only.
 #[test]
-fn a_part_of_a_drive_is_one() {
+fn a_part_of_a_drive_has_the_data_of_its_frames() {
     let at = tempfile::tempdir().unwrap();
     let whole = drive(at.path(), Scene::Urban);
     let part = whole.with_frames(10..20);

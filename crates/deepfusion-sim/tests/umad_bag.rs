@@ -22,7 +22,7 @@ fn simulation() -> Simulation {
 }
 
 #[test]
-fn the_bag_holds_the_drive() {
+fn the_bag_contains_the_drive() {
     let simulation = simulation();
     let folder = tempfile::tempdir().unwrap();
     let settings = BagSettings {
@@ -100,7 +100,7 @@ fn equal_drives_make_equal_bags_and_nothing_is_overwritten() {
 
 /// A bag that is stopped at its last frame is complete, and files of a killed writer do not block it.
 #[test]
-fn a_bag_that_is_stopped_at_its_last_frame_is_done() {
+fn a_bag_stopped_at_its_last_frame_is_complete() {
     let simulation = simulation();
     let folder = tempfile::tempdir().unwrap();
     let left = PartialFolder::beside(&folder.path().join("commercial_0011.bag")).unwrap();
@@ -127,7 +127,7 @@ fn a_bag_that_is_stopped_at_its_last_frame_is_done() {
 
 /// If another process takes the bag's name meanwhile, its file stays as it is, and no file is left beside it.
 #[test]
-fn a_bag_takes_nobodys_place() {
+fn a_bag_does_not_replace_another_file() {
     let simulation = simulation();
     let folder = tempfile::tempdir().unwrap();
     let taken = folder.path().join("commercial_0011.bag");
@@ -139,8 +139,11 @@ fn a_bag_takes_nobodys_place() {
         std::fs::write(&taken, "another's").unwrap();
         ControlFlow::Continue(())
     });
-    let said = error.unwrap_err().to_string();
-    assert!(said.contains("commercial_0011.bag: cannot move"), "{said}");
+    let message = error.unwrap_err().to_string();
+    assert!(
+        message.contains("commercial_0011.bag: cannot move"),
+        "{message}"
+    );
     assert_eq!(std::fs::read(&taken).unwrap(), b"another's");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }

@@ -192,7 +192,7 @@ fn radial_velocities_separate_dynamic_points() {
 }
 
 #[test]
-fn a_bag_s_moving_pixels_are_those_of_the_masks() {
+fn a_bag_s_moving_pixels_match_the_masks() {
     let simulation = simulation(Scene::Urban, 60, 10);
     let folder = tempfile::tempdir().unwrap();
     let set = open(&bag(&simulation, folder.path(), &BagSettings::default()));
@@ -229,7 +229,7 @@ fn a_bag_s_moving_pixels_are_those_of_the_masks() {
 }
 
 #[test]
-fn a_clock_that_is_ahead_is_set_back() {
+fn a_clock_offset_is_corrected() {
     let simulation = simulation(Scene::Urban, 150, 0);
     let folder = tempfile::tempdir().unwrap();
     let settings = BagSettings {

@@ -72,7 +72,7 @@ fn errors(dataset: &Dataset, motion: impl Fn(usize, usize) -> Se3) -> Errors {
 /// The gyro's bias of up to 0.5 degrees per second cannot be measured, since the vehicle never stops; the body rocks by some tenths of a
 /// degree.
 #[test]
-fn four_metres_are_known_to_a_tenth_of_a_degree() {
+fn turns_over_four_metres_are_accurate_to_a_tenth_of_a_degree() {
     for (scene, seed) in [
         (Scene::Garage, 74),
         (Scene::Garage, 75),

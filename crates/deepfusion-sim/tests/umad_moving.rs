@@ -89,7 +89,7 @@ fn count(moving: &[Vec<bool>]) -> usize {
 }
 
 #[test]
-fn a_pixel_has_the_velocity_of_what_is_seen_there() {
+fn a_pixel_has_the_velocity_of_its_surface() {
     let simulation = simulation();
     let folder = tempfile::tempdir().unwrap();
     let set = open(&bag(&simulation, folder.path()));

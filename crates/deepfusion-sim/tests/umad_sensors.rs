@@ -1,4 +1,4 @@
-//! The FMCW LiDAR, the 6-axis unit and the CAN bus against the exact motion.
+//! The FMCW LiDAR, the 6-axis unit and the CAN bus compared with the exact motion.
 
 use deepfusion_sim::{SceneObject, Sensors, SimConfig, Simulation, WHEELBASE_M};
 use nalgebra::Vector3;
@@ -19,7 +19,7 @@ fn drive(moving_cars: usize, frames: usize) -> Simulation {
 
 /// For a static point, the radial velocity is the sensor's own velocity along the ray, apart from noise.
 #[test]
-fn standing_points_come_nearer_as_fast_as_the_sensor_moves() {
+fn static_points_have_the_radial_velocity_of_the_sensor() {
     let simulation = drive(8, 60);
     let (before, now, after) = (39, 40, 41);
     let places = [before, now, after].map(|f| simulation.world_from_velo(f).translation());
@@ -141,7 +141,7 @@ fn speed_gyro_and_steering_agree_with_the_poses() {
 }
 
 #[test]
-fn equal_drives_read_the_same() {
+fn equal_drives_give_equal_readings() {
     let (a, b) = (drive(3, 30), drive(3, 30));
     assert_eq!(a.fmcw(0.5), b.fmcw(0.5));
     assert_eq!(a.imu_readings(), b.imu_readings());

@@ -28,7 +28,7 @@ fn digest(config: &SimConfig) -> u64 {
 
 /// The hashes were computed before worlds could be varied.
 #[test]
-fn the_five_scenes_are_what_they_always_were() {
+fn the_five_scenes_are_unchanged() {
     let known = [
         (Scene::Urban, 1, 0x6cd1_8257_47f6_ee02),
         (Scene::Urban, 2, 0x6e7f_f36d_cd5d_518a),
@@ -55,7 +55,7 @@ fn the_five_scenes_are_what_they_always_were() {
 
 /// The hash was computed before views could have hills, and before an ingredient could be left out.
 #[test]
-fn views_are_what_they_were_before_there_were_hills() {
+fn views_without_hills_are_unchanged() {
     let stream = Endless::new(EndlessConfig {
         width: 160,
         height: 96,

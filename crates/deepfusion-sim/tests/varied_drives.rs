@@ -132,9 +132,9 @@ fn the_road_lies_where_the_written_camera_sees_it() {
             ControlFlow::Continue(())
         })
         .expect("written");
-        let said = fs::read(path.join("varied.json")).expect("what was drawn");
-        let said: serde_json::Value = serde_json::from_slice(&said).expect("JSON");
-        let of = |key: &str| said["camera"][key].as_f64().expect("a number");
+        let bytes = fs::read(path.join("varied.json")).expect("what was drawn");
+        let json: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
+        let of = |key: &str| json["camera"][key].as_f64().expect("a number");
         let k = open(folder.path()).intrinsics(0);
         let drawn = simulation.drawn().expect("varied").camera.intrinsics;
         for (a, b) in [
@@ -231,8 +231,8 @@ fn a_bag_has_the_drawn_camera_and_its_mount() {
         &mut |_, _| ControlFlow::Continue(()),
     )
     .expect("written");
-    let said = fs::read_to_string(path.with_extension("varied.json")).expect("what was drawn");
-    assert!(said.contains("\"weather\"") && said.contains("\"jpeg_quality\""));
+    let text = fs::read_to_string(path.with_extension("varied.json")).expect("what was drawn");
+    assert!(text.contains("\"weather\"") && text.contains("\"jpeg_quality\""));
     let set = open(&path);
     let (k, drawn) = (set.intrinsics(0), simulation.intrinsics());
     assert_eq!(
@@ -262,7 +262,7 @@ fn a_bag_has_the_drawn_camera_and_its_mount() {
 
 /// No car appears or disappears within sight, although varied streets are too narrow for some.
 #[test]
-fn no_car_vanishes_before_the_camera() {
+fn no_car_disappears_ahead_of_the_camera() {
     let mut met = 0;
     for seed in 1..4 {
         let simulation = drive(&SimConfig {
@@ -301,7 +301,7 @@ fn no_car_vanishes_before_the_camera() {
 }
 
 #[test]
-fn what_a_varied_drive_cannot_have_is_refused() {
+fn settings_that_a_varied_drive_cannot_have_are_refused() {
     let varied = || config(Scene::Urban, 1);
     let bad = [
         (

@@ -40,7 +40,7 @@ fn one_seed_gives_one_world_and_another_a_different_one() {
 
 /// Every pixel has a finite depth or is sky; worlds are neither empty nor blocked in front of the camera.
 #[test]
-fn depths_are_finite_and_of_many_sizes() {
+fn depths_are_finite_and_vary() {
     for scene in Scene::EVERY {
         for seed in 1..4 {
             let frame = drive(scene, seed).frame(5);

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_do_what_they_say() {
+    fn each_change_has_its_effect() {
         let image = [0.2, 0.4, 0.6, 0.8, 0.1, 0.3];
         let with = |change| {
             let mut copy = image;

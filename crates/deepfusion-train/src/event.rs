@@ -30,7 +30,7 @@ pub enum TrainEvent {
         step: usize,
         /// Steps of the whole run.
         steps: usize,
-        /// The loss of the step's samples, the mean over its batches where several are accumulated.
+        /// The loss of the step's samples, the mean over its batches if several are accumulated.
         losses: LossTerms,
         /// The learning rate.
         learning_rate: f64,

@@ -90,7 +90,7 @@ mod tests {
 
     /// Each sample's depth and motion use its own set's factors, in both halves of a bidirectional batch.
     #[test]
-    fn every_sample_has_its_own_metres() {
+    fn every_sample_has_its_own_factors() {
         let device = Device::flex();
         let sample = |range, metres_per_unit, focal| SampleFactors {
             range,

@@ -144,7 +144,7 @@ mod tests {
     /// The losses (x − x_b)²/2 have the slope −x_b and the curvature 1 at 0. So the sandwich is the standard error of the mean, and the
     /// mean is the step to the optimum.
     #[test]
-    fn is_the_standard_error_of_a_mean() {
+    fn the_sandwich_is_the_standard_error_of_a_mean() {
         let x = [0.11, -0.05, 0.02, -0.08, 0.04, -0.04];
         let n = x.len() as f64;
         let mean = x.iter().sum::<f64>() / n;
@@ -162,7 +162,7 @@ mod tests {
 
     /// Small turns and shifts move the middle of the image in the same way for both focal lengths.
     #[test]
-    fn the_middle_of_the_image_does_not_determine_it() {
+    fn the_middle_of_the_image_does_not_determine_the_focal_length() {
         let device = Device::flex();
         let motion = Motion::new(
             Tensor::from_data([[0.004_f32, -0.006, 0.003]], &device),

@@ -46,9 +46,9 @@ impl LearnedFocal {
     /// Clamps on the device, so that a step on a GPU does not wait for the number to be read.
     fn clamped(self, least: f64, most: f64) -> Self {
         let (least, most) = (least.ln() as f32, most.ln() as f32);
-        let held = |log: Tensor<1>| log.inner().clamp(least, most).autodiff().require_grad();
+        let clamp = |log: Tensor<1>| log.inner().clamp(least, most).autodiff().require_grad();
         Self {
-            log_ratio: self.log_ratio.map(held),
+            log_ratio: self.log_ratio.map(clamp),
         }
     }
 
@@ -155,7 +155,7 @@ mod tests {
 
     /// The clamp on a GPU, which does not read the number, gives the same as that on the processor.
     #[test]
-    fn both_ways_hold_the_focal_length() {
+    fn both_ways_clamp_the_focal_length_alike() {
         let device = Device::flex().autodiff();
         let camera = AssumedCamera::default();
         let (least, most) = camera.ratios();
@@ -163,10 +163,16 @@ mod tests {
             let focal = || LearnedFocal {
                 log_ratio: Param::from_data(TensorData::from([log_ratio]), &device),
             };
-            let held = focal().clamped_to(&camera).ratio();
+            let on_host = focal().clamped_to(&camera).ratio();
             let clamped = focal().clamped(least, most);
-            assert!((clamped.ratio() - held).abs() < 1e-5 * held, "{held}");
-            assert!((held - expected).abs() < 1e-5 * held, "{held} {expected}");
+            assert!(
+                (clamped.ratio() - on_host).abs() < 1e-5 * on_host,
+                "{on_host}"
+            );
+            assert!(
+                (on_host - expected).abs() < 1e-5 * on_host,
+                "{on_host} {expected}"
+            );
             assert!(
                 clamped.log_ratio.val().is_require_grad(),
                 "it still requires its gradient"

@@ -108,7 +108,7 @@ impl Model {
             }
             let output = if self.config.reprojection == Reprojection::Mean {
                 let [_, _, _, width] = level.targets.dims();
-                let logits = pass.explained.iter().map(|logit| meaned(logit, width));
+                let logits = pass.explained.iter().map(|logit| block_means(logit, width));
                 losses::mean_reprojection(compared, &logits.collect::<Vec<_>>())
             } else {
                 losses::reprojection(compared, settings.automask)
@@ -463,11 +463,11 @@ fn shrunk(mask: &Tensor<4, Bool>, width: usize) -> Tensor<4, Bool> {
     if mask.dims()[3] == width {
         return mask.clone();
     }
-    meaned(&mask.clone().float(), width).greater_elem(0.5)
+    block_means(&mask.clone().float(), width).greater_elem(0.5)
 }
 
 /// An image at a smaller width: the means of its blocks.
-fn meaned(image: &Tensor<4>, width: usize) -> Tensor<4> {
+fn block_means(image: &Tensor<4>, width: usize) -> Tensor<4> {
     let factor = image.dims()[3] / width;
     if factor == 1 {
         return image.clone();

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_distance_keeps_the_direction() {
+    fn setting_the_distance_keeps_the_direction() {
         let device = Device::flex();
         let t = Tensor::<2>::from_data([[3.0, 0.0, -4.0], [0.0, 0.5, 0.0]], &device);
         let motion = Motion::new(Tensor::zeros([2, 3], &device), t);

@@ -24,7 +24,7 @@ pub struct PosePredictor {
 
 impl PosePredictor {
     /// Loads a run's folder or a checkpoint in it; a folder means its `best` checkpoint if there is
-    /// one. `set` names one of the data sets the run learned from, where it learned several.
+    /// one. `set` names one of the data sets the run learned from, if there are several.
     ///
     /// # Errors
     /// [`Error::NoPoseNet`] for a run without PoseNet or an imported depth network; [`deepfusion_model::Error::EncodersOnly`]; as

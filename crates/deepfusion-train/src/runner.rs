@@ -104,7 +104,7 @@ mod tests {
     use deepfusion_nn::weights::{collect, write_safetensors};
 
     #[test]
-    fn a_packed_network_is_the_one_it_was() {
+    fn a_packed_network_has_the_original_weights() {
         let mut config = Preset::Tiny.config();
         config.data.paths = vec!["/data/street".into()];
         config.init = Some("/data/first".into());

@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_epoch_sees_every_sample_once() {
+    fn an_epoch_has_every_sample_once() {
         let sampler = Sampler::new(10, 5, 3);
         let mut seen: Vec<usize> = (4..6).flat_map(|i| sampler.batch(i)).collect();
         seen.sort_unstable();
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_batch_larger_than_the_data_is_the_data() {
+    fn a_batch_is_at_most_as_large_as_the_data() {
         assert_eq!(Sampler::new(2, 12, 0).batch(5).len(), 2);
     }
 }

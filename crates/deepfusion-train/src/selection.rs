@@ -35,7 +35,7 @@ mod tests {
 
     /// Depth explains the images better, but PoseNet drifts away from the vehicle's measurements.
     #[test]
-    fn only_what_depth_can_change_decides() {
+    fn only_terms_that_depth_can_change_count() {
         let mut config = Preset::Tiny.config();
         config.loss.speed = 0.2;
         let terms = |reprojection, speed| LossTerms {
@@ -60,7 +60,7 @@ mod tests {
 
     /// Depth does not change then: only the head's loss can.
     #[test]
-    fn the_head_for_uncertainty_alone_is_chosen_by_its_own_loss() {
+    fn an_uncertainty_head_alone_is_chosen_by_its_own_loss() {
         let mut config = Preset::Tiny.config();
         (config.depth_net.uncertainty, config.loss.depth.weight) = (true, 0.0);
         let terms = |uncertainty| LossTerms {

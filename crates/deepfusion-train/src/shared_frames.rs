@@ -5,8 +5,8 @@ use deepfusion_data::FrameImage;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// The validation targets, frames with known depth among them, that are frames of training samples, drive by drive in order of names; drives without any are
-/// left out. Frames are identified by their file, with links resolved, and their position in it.
+/// The validation targets, including frames with known depth, that are also frames of training samples: by drive, in order of names, without
+/// drives that have none. Frames are identified by their file, with links resolved, and their position in it.
 #[must_use]
 pub fn shared_frames(train: &SampleSet, validation: &SampleSet) -> Vec<SharedFrames> {
     let mut files = Files::default();

@@ -23,7 +23,7 @@ fn is_sure(snippet: &Snippet) -> bool {
 
 /// The position of this reason in `skipped`, where it is added unless it is there. The two cameras of a drive, or its training and
 /// validation, give the same reason only once.
-fn noted(skipped: &mut Vec<Skipped>, reason: Skipped) -> usize {
+fn add_reason(skipped: &mut Vec<Skipped>, reason: Skipped) -> usize {
     let text = reason.to_string();
     let place = skipped.iter().position(|s| s.to_string() == text);
     place.unwrap_or_else(|| {
@@ -112,7 +112,7 @@ fn leave_out_broken(
             .retain(|frame| broken.is_readable(frame.place()));
     }
     for reason in broken.reasons {
-        noted(skipped, reason);
+        add_reason(skipped, reason);
     }
     Ok(())
 }
@@ -300,7 +300,7 @@ impl SampleSet {
                             unsure: all - snippets.len(),
                             of: all,
                         };
-                        let place = noted(skipped, reason);
+                        let place = add_reason(skipped, reason);
                         if snippets.is_empty() && !unsure.contains(&place) {
                             unsure.push(place);
                         }
@@ -331,7 +331,7 @@ impl SampleSet {
                         });
                     }
                 }
-                Err(error) => last = Some(noted(skipped, Skipped::Drive(error.into()))),
+                Err(error) => last = Some(add_reason(skipped, Skipped::Drive(error.into()))),
             }
         }
         let used = train.iter().chain(&held).flat_map(Sample::shown).collect();
@@ -340,7 +340,7 @@ impl SampleSet {
         train.retain(is_readable);
         held.retain(is_readable);
         for reason in broken.reasons {
-            last = Some(noted(skipped, reason));
+            last = Some(add_reason(skipped, reason));
         }
         let depth_alone =
             (0..config.data.sets.len().max(1)).all(|s| !config.learn(s).from_motion());

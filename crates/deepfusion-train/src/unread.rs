@@ -146,7 +146,7 @@ mod tests {
 
     /// Read together or alone, each batch gets its own numbers.
     #[test]
-    fn numbers_go_where_they_belong() {
+    fn each_batch_gets_its_own_numbers() {
         let device = Device::flex().autodiff();
         let value = |v: f32| Tensor::<1>::from_data([v], &device);
         let video = || {

@@ -103,8 +103,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_a_camera_that_is_learned() {
-        for (warning, said) in [
+    fn warnings_about_a_learned_camera() {
+        for (warning, message) in [
             (
                 TrainWarning::NoMeasuredTurns,
                 "the camera is learned without measured turns: only sharp turns determine the focal length then; a yaw rate with \
@@ -128,12 +128,12 @@ mod tests {
                  focal length explains the images equally well; do not rely on the metres, nor on depth that is not straight ahead",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), message);
         }
     }
 
     #[test]
-    fn drives_that_know_less_are_counted() {
+    fn drives_with_missing_measurements_are_counted() {
         let no_turns = |others| {
             let drive = "monday".into();
             TrainWarning::NoTurns { drive, others }.to_string()
@@ -168,8 +168,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_of_steps() {
-        for (warning, said) in [
+    fn warnings_about_steps() {
+        for (warning, message) in [
             (
                 TrainWarning::StepSkipped {
                     frames: vec!["monday/7".into(), "monday/9".into()],
@@ -186,7 +186,7 @@ mod tests {
                  (`loss.moving.warmup_share`) lets depth learn first",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), message);
         }
     }
 }

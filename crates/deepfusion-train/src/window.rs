@@ -112,7 +112,7 @@ mod tests {
 
     /// Image, depth and camera are cropped in the same way, and nothing is stretched.
     #[test]
-    fn image_depth_and_camera_are_cut_alike() {
+    fn image_depth_and_camera_are_cropped_alike() {
         let mut config = Preset::Tiny.config();
         config.augmentation.zoom = 2.0;
         let camera = camera(640, 480);

@@ -95,8 +95,8 @@ impl WorkerGroup {
     }
 
     /// Fails if the workers' numbers (hashes) differ. Only the lowest 16 bits of each are compared, so that their sums are exact.
-    pub(crate) fn check_equal(&mut self, what: [u64; 3]) -> Result<(), Error> {
-        let own = what.map(|number| (number & 0xffff) as f32);
+    pub(crate) fn check_equal(&mut self, numbers: [u64; 3]) -> Result<(), Error> {
+        let own = numbers.map(|number| (number & 0xffff) as f32);
         let mut sums = own;
         self.sum(&mut sums)?;
         let count = self.count() as f32;
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn means_flags_and_differences() {
+    fn means_flags_and_differences_over_workers() {
         let mut values = [1.0, 3.0];
         among(&[3.0, 5.0]).mean(&mut values).unwrap();
         assert_eq!(values, [2.0, 4.0]);

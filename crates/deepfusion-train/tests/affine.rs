@@ -86,7 +86,7 @@ fn scaled(mut pass: ForwardPass, leaves: &Leaves, model: &Model) -> ForwardPass 
 
 /// The term has no gradient for the scale of depth or of motion, nor for pixels that the other frame does not see.
 #[test]
-fn the_affine_term_pulls_at_no_scale_and_at_nothing_hidden() {
+fn the_affine_term_has_no_gradient_for_scales_or_hidden_pixels() {
     let (config, batch) = pair();
     let (without, scales_without) = gradient(&config, &batch, 0.0);
     let (with, scales_with) = gradient(&config, &batch, 1.0);

@@ -60,7 +60,7 @@ fn losses(model: &Model, motion: ViewMotion, batch: &SnippetBatch) -> LossTerms 
 
 /// The losses are means over the pairs, so a pair adds to the loss of `auto` what it adds to that of `vehicle` or `distance`.
 #[test]
-fn each_pair_counts_as_its_drive_does() {
+fn each_pair_is_treated_by_what_is_known_of_its_drive() {
     let folder = tempfile::tempdir().unwrap();
     let auto = settings(ViewMotion::Auto);
     let (train, _) = samples(folder.path(), &auto);
@@ -89,14 +89,14 @@ fn each_pair_counts_as_its_drive_does() {
     assert!((vehicle.reprojection - distance.reprojection).abs() > 1e-4);
     assert!((vehicle.speed - distance.speed).abs() > 1e-3);
     same("known", &[of(None)], &[vehicle]);
-    same("known, said so", &[of(Some([1.0, 1.0]))], &[vehicle]);
+    same("known, with a mask", &[of(Some([1.0, 1.0]))], &[vehicle]);
     same("unknown", &[of(Some([0.0, 0.0]))], &[distance]);
     let halves = [of(Some([1.0, 0.0])), of(Some([0.0, 1.0]))];
     same("one of each", &halves, &[vehicle, distance]);
 }
 
 #[test]
-fn drives_with_and_without_a_yaw_rate_are_learned_from_together() {
+fn drives_with_and_without_a_yaw_rate_train_together() {
     let folder = tempfile::tempdir().unwrap();
     let config = settings(ViewMotion::Auto);
     let (train, validation) = samples(folder.path(), &config);

@@ -44,10 +44,10 @@ fn samples_of_broken_images_are_left_out() {
         let [reason @ Skipped::BrokenImages { broken: 1, .. }] = skipped.as_slice() else {
             panic!("{skipped:?}");
         };
-        let said = reason.to_string();
+        let message = reason.to_string();
         assert!(
-            said.contains("0000000004.png") && said.contains("truncated"),
-            "{said}"
+            message.contains("0000000004.png") && message.contains("truncated"),
+            "{message}"
         );
     }
 

@@ -30,7 +30,7 @@ fn flow_decoder(model: &Model) -> Weights {
 }
 
 #[test]
-fn a_run_starts_from_the_flow_decoder_too_or_says_that_it_is_new() {
+fn a_run_starts_from_the_flow_decoder_too_or_reports_a_new_one() {
     let folder = tempfile::tempdir().unwrap();
     let device = Device::flex();
     let (with, run) = trained(folder.path(), "with", true);
@@ -64,7 +64,7 @@ fn a_run_starts_from_the_flow_decoder_too_or_says_that_it_is_new() {
 }
 
 #[test]
-fn moments_that_are_not_their_parameters_are_refused_by_name() {
+fn moments_that_do_not_fit_their_parameters_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let (trainer, run) = trained(folder.path(), "run", false);
     let path = run.checkpoint_path(CheckpointKind::Last);

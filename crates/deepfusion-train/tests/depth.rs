@@ -147,7 +147,7 @@ fn simulated_views_teach_depth_and_resume_exactly() {
 /// Every other batch has one of the other sizes, in turn. A run that is stopped before such a batch and resumed equals an uninterrupted
 /// one.
 #[test]
-fn batches_of_other_sizes_take_turns() {
+fn batches_take_the_other_sizes_in_turn() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = streets(6);
     let others = [[64, 96], [128, 64]].map(|[width, height]| InputSize { width, height });
@@ -177,7 +177,7 @@ fn batches_of_other_sizes_take_turns() {
 
 /// The uncertainty head learns while depth stays the same, to the last bit.
 #[test]
-fn the_head_for_uncertainty_learns_alone() {
+fn the_uncertainty_head_learns_alone() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = streets(20);
     config.depth_net.uncertainty = true;
@@ -223,7 +223,7 @@ fn batches(config: &TrainConfig, set: &SampleSet) -> Vec<DepthBatch> {
 
 /// A drive's scans, its motion or both are learned from, as `learn` of its set requires.
 #[test]
-fn a_drive_is_learned_from_as_its_set_says() {
+fn a_drive_teaches_what_its_set_requires() {
     let folder = tempfile::tempdir().unwrap();
     let simulation = Simulation::new(&SimConfig {
         seed: 5,
@@ -359,7 +359,7 @@ fn depth_and_motion_are_learned_in_one_step_and_resume_exactly() {
 
 /// Frozen weights must leave something to learn from each kind of sample in a run.
 #[test]
-fn frozen_weights_leave_every_source_something_to_teach() {
+fn frozen_weights_must_leave_some_for_every_kind_of_sample() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(&folder.path().join("street"), 8);
     let mixed = |config: &mut TrainConfig| {
@@ -420,7 +420,7 @@ fn frozen_weights_leave_every_source_something_to_teach() {
 /// What looks the same through a lens of twice the focal length is twice as far away: the true depth divided by the depth that the
 /// network's output stands for is the same.
 #[test]
-fn a_longer_lens_sees_the_same_as_farther() {
+fn twice_the_focal_length_means_twice_the_depth() {
     let config = streets(1);
     let (train, _) = samples(&config).unwrap();
     let seen = batches(&config, &train);
@@ -445,7 +445,7 @@ fn a_longer_lens_sees_the_same_as_farther() {
 }
 
 #[test]
-fn sets_that_cannot_be_learned_from_so_are_refused_by_field() {
+fn invalid_sets_are_refused_by_field() {
     type Change = fn(&mut TrainConfig);
     let cases: [(&str, Change); 8] = [
         ("data.sets.learn", |c| c.data.sets[0].learn = Learn::Both),

@@ -54,7 +54,7 @@ fn with_logits(config: &TrainConfig, logits: [f32; 2]) -> Model {
 
 /// Pairs are in time order: the target is the second frame of the pair with the frame before it, and the first of the other pair.
 #[test]
-fn masks_are_the_targets() {
+fn masks_belong_to_the_target() {
     let config = settings();
     let batch = snippet(&config);
     let model = with_logits(&config, [3.0, -2.0]);
@@ -72,7 +72,7 @@ fn masks_are_the_targets() {
 
 /// Masks of ½ halve the error, and their own loss is ln 2; both terms have a gradient for them.
 #[test]
-fn masks_weigh_the_error_and_have_their_price() {
+fn masks_weight_the_error_and_have_their_own_loss() {
     let config = settings();
     let batch = snippet(&config);
     let plain = TrainConfig {
@@ -110,7 +110,7 @@ fn masks_weigh_the_error_and_have_their_price() {
 }
 
 #[test]
-fn masks_without_their_price_are_refused() {
+fn masks_without_their_own_loss_are_refused() {
     let field = |change: fn(&mut TrainConfig)| {
         let mut config = settings();
         change(&mut config);

@@ -151,7 +151,7 @@ fn scale_ratio(model: &Model, config: &TrainConfig, set: SampleSet) -> f64 {
 /// A network for two focal lengths predicts metres for one of them, and depth of the other is scaled to it. Otherwise the same pixels would
 /// have to be near for one camera and far for the other.
 #[test]
-fn cameras_of_one_set_are_brought_to_one_focal_length() {
+fn depth_of_one_set_is_scaled_to_one_focal_length() {
     let both = both();
     let with = |drives: &[PathBuf; 2], name: &str| {
         let mut config = config(&both.drives);
@@ -196,7 +196,7 @@ fn cameras_of_one_set_are_brought_to_one_focal_length() {
 
 /// The factors are found in the data, set by set, and each sample of a batch gets those of its set and camera.
 #[test]
-fn every_sample_brings_its_own_camera_range_and_unit() {
+fn every_sample_has_its_own_camera_range_and_unit() {
     let both = both();
     let trainer = created(&both, "run");
     let config = trainer.config();

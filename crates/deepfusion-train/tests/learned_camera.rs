@@ -222,7 +222,7 @@ fn gradients_of_the_focal_lengths_equal_those_of_the_definition() {
 
 /// With the true depth and motion in bends, the photometric error alone corrects a focal length that is 30 % off.
 #[test]
-fn the_photometric_error_of_bends_finds_the_focal_length() {
+fn the_photometric_error_in_bends_finds_the_focal_length() {
     let device = Device::flex().autodiff();
     let simulation = bends(25);
     let truth = simulation.intrinsics();
@@ -312,7 +312,7 @@ fn start(config: &TrainConfig, run: &Path, sets: (SampleSet, SampleSet)) -> Trai
 /// New networks and a camera that is off by a third. After a few steps depth is still poor, but measured turns have corrected the focal
 /// length, and the spread confirms it.
 #[test]
-fn a_short_run_finds_the_camera_of_bends() {
+fn a_short_run_on_bends_finds_the_camera() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let simulation = bends(40);
@@ -346,7 +346,7 @@ fn a_short_run_finds_the_camera_of_bends() {
 
 /// On a straight drive, every focal length explains the images.
 #[test]
-fn a_straight_drive_says_that_it_does_not_determine_the_focal_length() {
+fn a_straight_drive_leaves_the_focal_length_undetermined() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     folder_without_camera(&straight(40), &at("drive"));

@@ -134,7 +134,7 @@ fn the_affine_invariant_loss_equals_pytorch() {
 }
 
 #[test]
-fn the_other_depth_seen_from_here_equals_pytorch() {
+fn the_other_depth_seen_from_the_target_equals_pytorch() {
     let reference = Reference::read();
     let depth = reference.tensor::<4>("seen/depth").require_grad();
     let coords = reference.tensor::<4>("seen/coords").require_grad();
@@ -171,7 +171,7 @@ fn agreement_equals_pytorch() {
 }
 
 #[test]
-fn moving_pixels_equal_pytorch() {
+fn dynamic_pixels_equal_pytorch() {
     let reference = Reference::read();
     let ends = reference.tensor::<4>("seen/coords");
     let motion = Motion::new(
@@ -234,7 +234,7 @@ fn moving_pixels_equal_pytorch() {
 
 /// Neither the scale of depth nor an offset changes the loss, and its gradient changes neither.
 #[test]
-fn the_affine_invariant_loss_is_blind_to_the_scale() {
+fn the_affine_invariant_loss_does_not_depend_on_the_scale() {
     let reference = Reference::read();
     let (x, y) = (
         reference.tensor::<4>("affine/x"),
@@ -303,7 +303,7 @@ fn the_affine_invariant_loss_does_not_reward_a_flat_depth() {
 
 /// For two flows that contradict each other everywhere, all pixels in view still count, so that they can learn from the error.
 #[test]
-fn a_flow_that_never_comes_back_keeps_learning() {
+fn contradictory_flows_keep_learning() {
     let reference = Reference::read();
     let (first, second) = (
         reference.tensor("flow/first"),
@@ -395,7 +395,7 @@ fn gradients_equal_finite_differences() {
 
 /// Known depth, pixels that are only known to be far, and unknown ones; four scales.
 #[test]
-fn the_loss_on_known_depth_equals_pytorchs() {
+fn the_loss_on_known_depth_equals_pytorch() {
     let reference = Reference::of("depth.safetensors");
     let names: Vec<String> = (0..4).map(|s| format!("inverse{s}")).collect();
     let inverse: Vec<Tensor<4>> = names
@@ -436,7 +436,7 @@ fn the_loss_on_known_depth_equals_pytorchs() {
 /// The uncertainty loss against PyTorch's Laplace distribution, with scales beyond the limits, too. The sky and unknown pixels have no
 /// effect.
 #[test]
-fn the_likelihood_of_the_error_of_depth_equals_pytorchs() {
+fn the_uncertainty_loss_equals_pytorch() {
     let reference = Reference::of("depth.safetensors");
     let log_scale = reference
         .tensor::<4>("uncertainty/log_scale")
@@ -507,7 +507,7 @@ fn a_batchs_loss_is_the_mean_of_its_images() {
 }
 
 #[test]
-fn sources_count_as_far_as_their_masks_say() {
+fn sources_are_weighted_by_their_masks() {
     let reference = Reference::of("explainability.safetensors");
     let leaf = |name: String| {
         let tensor = reference.tensor::<4>(&format!("explainability/{name}"));

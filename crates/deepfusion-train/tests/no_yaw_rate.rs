@@ -28,7 +28,7 @@ fn recording() -> (tempfile::TempDir, Dataset) {
 }
 
 #[test]
-fn what_reads_turns_is_refused_and_the_rest_trains() {
+fn configurations_that_need_turns_are_refused_and_others_train() {
     let (_folder, dataset) = recording();
     let with = |change: &dyn Fn(&mut TrainConfig)| {
         let mut config = Preset::Tiny.config();

@@ -58,7 +58,7 @@ fn values(plane: &Tensor<4>) -> Vec<f32> {
 
 /// Every pixel has the depth of the depth image at its centre, in metres. A hole is neither known nor far.
 #[test]
-fn depth_images_are_learned_from_in_metres_and_their_holes_are_no_sky() {
+fn depth_images_are_read_in_metres_and_holes_are_not_sky() {
     let folder = tempfile::tempdir().unwrap();
     write_folder(folder.path(), [1, 1]);
     let (config, train, validation) = learning(folder.path(), 1);

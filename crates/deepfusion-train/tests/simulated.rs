@@ -122,7 +122,7 @@ fn a_resumed_run_repeats_the_uninterrupted_one_to_the_last_digit() {
 }
 
 #[test]
-fn so_does_a_run_with_every_term_of_the_loss() {
+fn a_resumed_run_with_every_loss_term_repeats_the_uninterrupted_one() {
     let whole = resumed_equals_whole(|config| {
         for term in ["affine", "flow", "moving"] {
             config.with(term).unwrap();
@@ -171,7 +171,7 @@ fn resumed_equals_whole(change: impl Fn(&mut TrainConfig)) -> Vec<(usize, LossTe
 
 /// Checkpoints between validations are due by time, have the current step, and do not change what is learned.
 #[test]
-fn a_checkpoint_is_written_when_its_time_has_come() {
+fn checkpoints_are_written_when_they_are_due() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(&folder.path().join("street"), 8);
     let device = Device::flex();
@@ -214,7 +214,7 @@ fn a_checkpoint_is_written_when_its_time_has_come() {
 
 /// Of two frames, each is the target of the other. Three frames have one target, and flows to both sides.
 #[test]
-fn the_flow_is_seen_from_every_target_in_both_arrangements() {
+fn every_target_has_its_flows_with_both_reprojections() {
     let folder = tempfile::tempdir().unwrap();
     let (mut config, samples, _) = small(&drive(folder.path(), 8), 1);
     let device = Device::flex().autodiff();
@@ -278,7 +278,7 @@ fn a_checkpoint_of_another_network_is_refused_by_its_tensor() {
 
 /// Mirrored samples have a mirrored camera and motion. A batch's content depends on its number alone.
 #[test]
-fn batches_are_the_same_again() {
+fn batches_are_reproducible() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(&folder.path().join("street"), 8);
     let (config, train, _) = small(&drive, 1);
@@ -301,7 +301,7 @@ fn batches_are_the_same_again() {
 
 /// Views are warped by PoseNet's motion, by PoseNet's motion at the measured distance, or by the vehicle's motion.
 #[test]
-fn the_views_follow_the_motion_that_is_asked_for() {
+fn views_are_warped_by_the_configured_motion() {
     let folder = tempfile::tempdir().unwrap();
     let (config, samples, _) = small(&drive(folder.path(), 8), 1);
     let device = Device::flex().autodiff();
@@ -326,12 +326,12 @@ fn the_views_follow_the_motion_that_is_asked_for() {
             let here = of(motion, 20.0, 1);
             for (other, matters) in [(of(motion, 400.0, 1), length), (of(motion, 20.0, 2), net)] {
                 let difference = (here - other).abs();
-                let as_said = if matters {
+                let as_expected = if matters {
                     difference > 1e-4
                 } else {
                     difference < 1e-6
                 };
-                assert!(as_said, "{motion:?} {compare_at:?}: {here} {other}");
+                assert!(as_expected, "{motion:?} {compare_at:?}: {here} {other}");
             }
         }
     }

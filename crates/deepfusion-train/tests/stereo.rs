@@ -51,7 +51,7 @@ fn samples(config: &TrainConfig, drive: &Path, camera: Cameras) -> Result<Sample
 /// A split may hold out a moment of one camera and train on the same moment of the other. The held-out image must not be the other's second
 /// view.
 #[test]
-fn a_held_out_target_is_no_view_in_training() {
+fn a_held_out_target_is_not_a_view_in_training() {
     let folder = tempfile::tempdir().unwrap();
     let street = Simulation::new(&SimConfig {
         seed: 5,
@@ -105,7 +105,7 @@ fn a_held_out_target_is_no_view_in_training() {
 /// Each camera's frame is explained by the other's, warped with exact depth and the calibrated baseline, and with no other baseline;
 /// mirrored or not.
 #[test]
-fn the_other_cameras_view_is_where_the_depth_says() {
+fn the_other_cameras_view_fits_depth_and_baseline() {
     let folder = tempfile::tempdir().unwrap();
     let street = street();
     let drive = write_kitti(
@@ -206,7 +206,7 @@ fn depth_of(street: &Simulation, name: &str, image: &[f32]) -> (Vec<f32>, bool) 
 
 /// The baseline is used only for warping. PoseNet sees the pair in time, and its loss and the scale ratio depend on that pair alone.
 #[test]
-fn posenet_is_not_asked_for_the_other_camera() {
+fn posenet_does_not_predict_the_other_cameras_pose() {
     let folder = tempfile::tempdir().unwrap();
     let drive = write_kitti(&street(), folder.path(), &mut |_, _| {
         ControlFlow::Continue(())
@@ -311,7 +311,7 @@ fn a_drive_with_one_camera_learns_beside_one_with_two() {
 }
 
 #[test]
-fn one_camera_is_no_stereo() {
+fn drives_without_a_usable_second_camera_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let drive = write_kitti(&street(), folder.path(), &mut |_, _| {
         ControlFlow::Continue(())

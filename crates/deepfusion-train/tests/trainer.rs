@@ -59,7 +59,7 @@ fn a_loader_that_dies_is_an_error_in_training_and_in_validation() {
 }
 
 #[test]
-fn a_loader_that_has_given_all_says_so_again() {
+fn a_finished_loader_stays_finished() {
     let folder = tempfile::tempdir().unwrap();
     let (config, train, _) = small(&drive(folder.path(), 8), 1);
     let device = Device::flex();
@@ -73,7 +73,7 @@ fn a_loader_that_has_given_all_says_so_again() {
 }
 
 #[test]
-fn nothing_held_out_is_an_error_unless_it_was_asked_for() {
+fn no_held_out_samples_are_an_error_unless_configured() {
     let folder = tempfile::tempdir().unwrap();
     let (mut config, train, validation) = small(&drive(&folder.path().join("street"), 8), 1);
     config.pose_net.metres_per_unit = 0.8;
@@ -153,7 +153,7 @@ fn a_step_of_several_batches_reports_all_of_them() {
 
 /// If the vehicle gives the motion, PoseNet's own loss does not depend on depth, but it would dominate the choice.
 #[test]
-fn best_is_chosen_by_what_depth_can_change() {
+fn best_is_chosen_by_terms_that_depth_can_change() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(&folder.path().join("street"), 14);
     for motion in [ViewMotion::Auto, ViewMotion::PoseNet] {

@@ -62,7 +62,7 @@ fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
 
 /// Images, camera and metres of a batch fit its size. Held-out images keep the run's size.
 #[test]
-fn a_batch_has_one_size_in_everything() {
+fn images_camera_and_metres_of_a_batch_fit_its_size() {
     let folder = tempfile::tempdir().unwrap();
     let drive = support::drive(&folder.path().join("drive"), 12);
     let mut config = settings(Preset::Tiny);
@@ -133,7 +133,7 @@ fn every_preset_learns_at_several_sizes() {
 
 /// A run that is stopped before a batch of another size and resumed equals an uninterrupted one.
 #[test]
-fn a_resumed_run_sees_the_same_sizes() {
+fn a_resumed_run_has_the_same_sizes() {
     let folder = tempfile::tempdir().unwrap();
     let drive = support::drive(&folder.path().join("drive"), 12);
     let mut config = settings(Preset::Tiny);
@@ -156,7 +156,7 @@ fn a_resumed_run_sees_the_same_sizes() {
 
 /// Without a canonical focal length, a disparity would stand for the same depth at every size. A size must also be valid for the networks.
 #[test]
-fn sizes_that_cannot_be_learned_at_are_refused() {
+fn invalid_sizes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let drive = support::drive(&folder.path().join("drive"), 8);
     let mut config = settings(Preset::Tiny);

@@ -31,7 +31,7 @@ fn depth_weights(trainer: &Trainer) -> BTreeMap<String, WeightTensor> {
 
 /// Continues for at most `most` steps. Returns the speed terms and scale ratios of steps and validations.
 fn run(trainer: &mut Trainer, most: usize) -> Vec<(f64, f64)> {
-    let mut said = Vec::new();
+    let mut reported = Vec::new();
     trainer
         .run(&mut |event| match event {
             TrainEvent::Step {
@@ -40,7 +40,7 @@ fn run(trainer: &mut Trainer, most: usize) -> Vec<(f64, f64)> {
                 scale_ratio,
                 ..
             } => {
-                said.push((losses.speed, scale_ratio));
+                reported.push((losses.speed, scale_ratio));
                 if step >= most {
                     Control::Stop
                 } else {
@@ -52,13 +52,13 @@ fn run(trainer: &mut Trainer, most: usize) -> Vec<(f64, f64)> {
                 scale_ratio,
                 ..
             } => {
-                said.push((losses.speed, scale_ratio));
+                reported.push((losses.speed, scale_ratio));
                 Control::Continue
             }
             _ => Control::Continue,
         })
         .unwrap();
-    said
+    reported
 }
 
 /// The depth network learns exactly the same, PoseNet's numbers are absent, and the run can be resumed.
@@ -77,14 +77,16 @@ fn depth_learns_the_same_without_pose_net() {
     let mut whole = start("whole", &without);
     assert!(with.model().pose_net.is_some() && whole.model().pose_net.is_none());
     let before = depth_weights(&with);
-    let said = run(&mut with, 9);
+    let reported = run(&mut with, 9);
     assert!(
-        said.iter()
+        reported
+            .iter()
             .all(|(speed, ratio)| *speed > 0.0 && ratio.is_finite())
     );
-    let said = run(&mut whole, 9);
+    let reported = run(&mut whole, 9);
     assert!(
-        said.iter()
+        reported
+            .iter()
             .all(|(speed, ratio)| *speed == 0.0 && ratio.is_nan())
     );
     assert!(depth_weights(&with) != before);
@@ -101,7 +103,7 @@ fn depth_learns_the_same_without_pose_net() {
 
 /// The checkpoint has no PoseNet: requesting one is an error, and a run that starts from the checkpoint has a new one.
 #[test]
-fn its_checkpoint_has_none() {
+fn the_checkpoint_has_no_pose_net() {
     let folder = tempfile::tempdir().unwrap();
     let (config, train, validation) = small(&drive(&folder.path().join("street"), 10), 1);
     let without = settings(&config, false);

@@ -132,7 +132,7 @@ fn prepared(at: &Path) -> (TrainConfig, Sets) {
 
 /// With batches of several sizes, all workers' batches of a step have the same size.
 #[test]
-fn workers_take_turns_in_size_together() {
+fn all_workers_have_the_same_size_in_a_step() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| -> PathBuf { folder.path().join(name) };
     let (mut config, sets) = prepared(folder.path());
@@ -230,7 +230,7 @@ fn a_worker_that_fails_ends_the_others() {
 }
 
 #[test]
-fn workers_that_do_not_hold_the_same_do_not_begin() {
+fn workers_that_differ_do_not_begin() {
     let folder = tempfile::tempdir().unwrap();
     let start = prepared(folder.path());
     type Change = fn(usize, &mut TrainConfig, &mut Sets);

@@ -82,7 +82,7 @@ fn the_page_shows_the_content_of_the_files() {
         (0.0, "no depth".into())
     );
 
-    boxes_are_where_they_belong(&mut browser);
+    boxes_are_in_the_right_place(&mut browser);
 
     // Playing and stepping.
     browser.key(" ");

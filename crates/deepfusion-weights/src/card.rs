@@ -38,7 +38,7 @@ pub struct Card {
     pub numbers: String,
     /// Largest |packed − original| / original of the depths of a picture: the cost of rounding the numbers.
     pub depth_difference: f64,
-    /// Anything else worth knowing.
+    /// Further notes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
     /// Evaluations of the checkpoint before it was packed.
@@ -169,7 +169,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_card_survives_its_text() {
+    fn a_card_is_written_and_read_back() {
         let card = card("street");
         let text = card.to_toml().unwrap();
         assert!(text.starts_with("# What street.safetensors is"), "{text}");
@@ -180,7 +180,7 @@ pub(crate) mod tests {
 
     /// Errors name the card, and another version is reported before any other problem.
     #[test]
-    fn what_is_no_card_is_named() {
+    fn invalid_cards_are_named() {
         let message = |text: &str| Card::parse("street.toml", text).unwrap_err().to_string();
         let newer = message("format_version = 7\nnew = 'thing'");
         assert!(

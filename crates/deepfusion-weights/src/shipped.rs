@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_networks_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("new");
         let network = street();
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_the_command_line_could_not_tell_apart_are_refused() {
+    fn invalid_names_are_refused() {
         for bad in ["", "none", "Street", "a/b", "1st", "-x", "a b", "a.b"] {
             let error = Shipped::new(card(bad), Vec::new()).unwrap_err();
             assert!(matches!(error, Error::Name { .. }), "{bad}");
@@ -269,7 +269,7 @@ mod tests {
 
     /// Checks the files in `weights/`: every embedded network matches its card.
     #[test]
-    fn what_is_embedded_is_what_its_card_says() {
+    fn embedded_networks_match_their_cards() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights");
         let pairs = scan(&folder).unwrap();
         let there: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();

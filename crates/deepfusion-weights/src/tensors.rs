@@ -93,7 +93,7 @@ mod tests {
 
     /// f32 values between 1 and the next bf16, 1 + 2⁻⁷, are rounded to one of the two.
     #[test]
-    fn halves_go_to_the_even_neighbour() {
+    fn ties_are_rounded_to_even() {
         let step = 2.0_f32.powi(-7);
         for (value, expected) in [
             (1.0, 1.0),
@@ -129,7 +129,7 @@ mod tests {
     proptest! {
         /// No other bf16 is nearer.
         #[test]
-        fn the_nearest_is_taken(value in -1e30_f32..1e30) {
+        fn values_are_rounded_to_the_nearest(value in -1e30_f32..1e30) {
             let bits = bf16(value).unwrap();
             let error = |bits: u16| (f64::from(back(bits)) - f64::from(value)).abs();
             for other in [bits.wrapping_sub(1), bits.wrapping_add(1)] {
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_kept_is_named() {
+    fn values_that_cannot_be_packed_are_named() {
         for (shape, value) in [
             (&[1][..], f32::NAN),
             (&[1, 1], f32::INFINITY),

@@ -23,7 +23,7 @@ const NAMES: [&str; 8] = [
 ];
 
 /// KITTI raw's calibration file, which lies above the drives.
-const OF_A_DATE: &str = "calib_cam_to_cam.txt";
+const KITTI_RAW: &str = "calib_cam_to_cam.txt";
 
 /// The path of a calibration file beside an image, in the folder above or, for KITTI, some folders further up. The file is not read.
 #[must_use]
@@ -32,7 +32,7 @@ pub fn calibration_near(image: &Path) -> Option<PathBuf> {
     let folders = image.ancestors().skip(1).take(5).enumerate();
     let mut files = folders.flat_map(|(above, folder)| {
         let beside = if above < 2 { &NAMES[..] } else { &[] };
-        let names = beside.iter().chain([&OF_A_DATE]);
+        let names = beside.iter().chain([&KITTI_RAW]);
         names.map(|name| folder.join(name)).collect::<Vec<_>>()
     });
     files.find(|file| file.is_file())
@@ -87,12 +87,12 @@ pub(crate) fn find_camera(
     if let Some(file) = file {
         return CameraCalibration::read(&file, size);
     }
-    let said = match pictures {
+    let described = match pictures {
         Pictures::Images(images) => by_exif(images, size)?,
         Pictures::Video(file, Some(lens)) => by_gopro(file, lens, size)?,
         Pictures::Video(_, None) => None,
     };
-    if let Some((calibration, warning)) = said {
+    if let Some((calibration, warning)) = described {
         warnings.push(warning.into());
         return Ok(calibration);
     }
@@ -127,7 +127,7 @@ fn in_numbers(config: &FolderConfig, size: (u32, u32)) -> Result<Option<CameraCa
 }
 
 /// How many images of a recording are checked for the same focal length.
-const ASKED: usize = 9;
+const CHECKED: usize = 9;
 
 /// The camera according to the images' EXIF blocks, with a warning about that; `None` if the first image's block does not describe it.
 ///
@@ -137,19 +137,22 @@ fn by_exif(
     images: &[PathBuf],
     size: (u32, u32),
 ) -> Result<Option<(CameraCalibration, CameraWarning)>> {
-    let said = |path: &PathBuf| exif_camera(path, size);
-    let Some((path, first)) = images.first().and_then(|path| Some((path, said(path)?))) else {
+    let camera_of = |path: &PathBuf| exif_camera(path, size);
+    let Some((path, first)) = images
+        .first()
+        .and_then(|path| Some((path, camera_of(path)?)))
+    else {
         return Ok(None);
     };
-    let asked = (1..ASKED).map(|i| &images[i * (images.len() - 1) / (ASKED - 1)]);
-    for (other, camera) in asked.filter_map(|path| Some((path, said(path)?))) {
+    let checked = (1..CHECKED).map(|i| &images[i * (images.len() - 1) / (CHECKED - 1)]);
+    for (other, camera) in checked.filter_map(|path| Some((path, camera_of(path)?))) {
         // The 35 mm equivalent focal length is in whole millimetres.
         if (camera.intrinsics.fx / first.intrinsics.fx - 1.0).abs() > 1e-6 {
             return Err(Error::CameraFile {
                 by: other.as_path().into(),
                 problem: CameraProblem::Zoomed {
-                    said: camera.by,
-                    other_said: first.by,
+                    entry: camera.by,
+                    other_entry: first.by,
                     other: name_of(path),
                 },
             });

@@ -161,7 +161,7 @@ fn resized(depth: DepthMap, width: usize, height: usize) -> DepthMap {
 }
 
 /// Largest extent to each side of a pinhole image from a fisheye lens: tan 60°.
-const WIDEST: f64 = 1.732_050_807_568_877_2;
+const MAX_TAN: f64 = 1.732_050_807_568_877_2;
 
 /// The pinhole camera that sees the largest rectangle of rays that are all in the image.
 fn largest_valid(
@@ -184,13 +184,13 @@ fn largest_valid(
         // A border pixel without a ray is at least 90 degrees from the axis, far outside the widest image.
         let limit = |side: Option<f64>, widest: f64| {
             let side = side.unwrap_or(widest);
-            Some(if side.abs() > WIDEST { widest } else { side })
+            Some(if side.abs() > MAX_TAN { widest } else { side })
         };
         [
-            limit(left_x, -WIDEST),
-            limit(top_y, -WIDEST),
-            limit(right_x, WIDEST),
-            limit(bottom_y, WIDEST),
+            limit(left_x, -MAX_TAN),
+            limit(top_y, -MAX_TAN),
+            limit(right_x, MAX_TAN),
+            limit(bottom_y, MAX_TAN),
         ]
     } else {
         [left_x, top_y, right_x, bottom_y]
@@ -256,14 +256,14 @@ mod tests {
 
     #[test]
     fn corners_that_fold_over_are_left_out() {
-        // x(1 - x²/4) turns back at 0.77; the image's corners are at 0.84.
+        // x(1 - x²/4) is at most 0.77; the image's corners are at 0.84.
         let bent = Distortion::from_opencv(&[-0.25, 0.0, 0.0, 0.0]).unwrap();
         let k = Lens::new(camera(), &bent).unwrap().intrinsics();
         assert!(k.fx < 60.0 && k.fx > 40.0, "{k:?}");
     }
 
     #[test]
-    fn another_size_is_refused() {
+    fn images_of_another_size_are_refused() {
         let bent = Distortion::from_opencv(&[-0.2, 0.0, 0.0, 0.0]).unwrap();
         let lens = Lens::new(camera(), &bent).unwrap();
         assert!(lens.correct(RgbImage::new(79, 60)).is_err());
@@ -306,7 +306,7 @@ mod tests {
         /// The map takes a point's pixel in the corrected pinhole image to its pixel in the original image, and
         /// never points outside the original image.
         #[test]
-        fn corrected_pixels_see_their_rays(
+        fn corrected_pixels_map_to_their_rays_in_the_original(
             k1 in -0.2..0.3f64, k2 in -0.02..0.05f64, p1 in -0.003..0.003f64, p2 in -0.003..0.003f64,
             u in 0u32..80, v in 0u32..60,
         ) {

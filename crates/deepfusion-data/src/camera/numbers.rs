@@ -57,7 +57,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn four_numbers_or_a_matrix() {
+    fn four_numbers_or_a_matrix_are_read() {
         let four = parse("585, 586, 320, 240\n").unwrap().pinhole;
         assert_eq!(four, [585.0, 586.0, 320.0, 240.0]);
         assert_eq!(

@@ -70,7 +70,7 @@ mod tests {
     proptest! {
         /// The file is read back with all digits.
         #[test]
-        fn it_is_read_again(
+        fn a_written_calibration_is_read_back(
             pinhole in proptest::array::uniform4(50.0..500.0f64), k in proptest::collection::vec(-0.5..0.5f64, 8), kind in 0..4usize,
         ) {
             let camera = Intrinsics::from_numbers(pinhole, (640, 480));

@@ -171,13 +171,13 @@ impl Matrix {
             Self::List(data) => Ok(data),
             Self::Nested(rows) => Ok(rows.concat()),
             Self::Sized { rows, cols, data } => {
-                let said = rows.zip(cols).map(|(r, c)| u64::from(r) * u64::from(c));
-                match said {
-                    Some(said) if said != data.len() as u64 => {
+                let expected = rows.zip(cols).map(|(r, c)| u64::from(r) * u64::from(c));
+                match expected {
+                    Some(expected) if expected != data.len() as u64 => {
                         Err(CalibrationFileProblem::MatrixSize {
                             field,
                             found: data.len(),
-                            said,
+                            expected,
                         })
                     }
                     _ => Ok(data),

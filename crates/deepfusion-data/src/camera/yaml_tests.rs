@@ -140,7 +140,7 @@ fn fisheye_lenses_are_read() {
 }
 
 #[test]
-fn other_lenses_are_named() {
+fn errors_name_unsupported_lens_models() {
     for (text, model) in [
         (KALIBR.replacen("radtan", "fov", 1), "fov"),
         (KALIBR.replacen("pinhole", "omni", 1), "omni"),
@@ -156,7 +156,7 @@ fn other_lenses_are_named() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_the_field() {
     for (text, problem) in [
         (
             OPENCV.replace("camera_matrix", "matrix"),

@@ -1,4 +1,6 @@
-use super::parts::{Converted, SIMULATED, at_ns, go_on, moving_at, points, seconds_to_move};
+use super::parts::{
+    Converted, SIMULATED, at_ns, check_not_stopped, moving_at, points, seconds_to_move,
+};
 use crate::{Dataset, Error, GtKind, ImageProblem, MotionModel, Result, TopicProblem};
 use deepfusion_geometry::Se3;
 use deepfusion_rosbag::msg::{
@@ -96,7 +98,7 @@ pub fn convert_to_bag(
             }
         }
         done += batch.len();
-        go_on(progress(done, times.len()), done, times.len())?;
+        check_not_stopped(progress(done, times.len()), done, times.len())?;
     }
     super::parts::write_text(&sidecar, &describe(dataset))?;
     if let Err(error) = bag.finish() {

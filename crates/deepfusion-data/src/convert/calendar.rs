@@ -22,7 +22,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn known_days_have_their_dates() {
+    fn known_times_have_the_right_dates() {
         for (days, expected) in [
             (0, "1970_01_01"),
             (-1, "1969_12_31"),

@@ -1,6 +1,6 @@
 use super::calendar::{date, stamp};
 use super::parts::{
-    Converted, Moving, SIMULATED, at_ns, go_on, moving_at, points, seconds_to_move,
+    Converted, Moving, SIMULATED, at_ns, check_not_stopped, moving_at, points, seconds_to_move,
 };
 use crate::dataset_toml::FolderConfig;
 use crate::{Dataset, Error, MotionModel, Result, VehicleTrack, save_png};
@@ -84,7 +84,7 @@ fn write_date(
         let drive = folder.join(&name);
         write_drive(dataset, &drive, moved_s, &mut |frames| {
             done += frames;
-            go_on(progress(done, total), done, total)
+            check_not_stopped(progress(done, total), done, total)
         })?;
         write_notes(dataset, &drive)?;
         names.push(name);

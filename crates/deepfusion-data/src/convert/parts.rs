@@ -78,7 +78,7 @@ pub(super) fn require_empty(out: &Path) -> Result<()> {
 }
 
 /// Stops a conversion if the progress callback requests it and frames are left.
-pub(super) fn go_on(asked: ControlFlow<()>, done: usize, total: usize) -> Result<()> {
+pub(super) fn check_not_stopped(asked: ControlFlow<()>, done: usize, total: usize) -> Result<()> {
     if asked.is_break() && done < total {
         Err(Error::Stopped { done, total })
     } else {

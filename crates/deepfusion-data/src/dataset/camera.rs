@@ -56,7 +56,7 @@ impl Cameras {
 #[non_exhaustive]
 #[error("unknown camera '{text}', expected 2, 3 or both")]
 pub struct NoSuchCamera {
-    /// The text.
+    /// The text given.
     pub text: String,
 }
 

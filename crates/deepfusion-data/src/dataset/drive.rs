@@ -115,7 +115,7 @@ impl Dataset {
         let selection = Selection::new(options);
         let numbers = self.frames().iter().map(|f| f.number);
         let selected = selection.of(self.split_name(), self.scenario(), self.camera(), numbers);
-        match selection.nothing(path) {
+        match selection.nothing_selected(path) {
             Some(error) if selected.is_empty() => Err(error),
             _ => Ok(self.with_selected(selected)),
         }

@@ -8,9 +8,9 @@ use nalgebra::{Vector2, Vector3};
 use std::fmt;
 
 /// Largest standard error of a heading that is used, radians: a quarter of a degree.
-const SURE: f64 = 0.0044;
+const MAX_STD_ERROR: f64 = 0.0044;
 /// Largest offset of a heading that is used, radians: ten degrees. A larger one has another cause.
-const MOST: f64 = 0.175;
+const MAX_OFFSET: f64 = 0.175;
 
 /// Difference between the direction of travel in the images and that according to the mount.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +25,7 @@ impl Heading {
     /// Whether it can be used to correct the mount: its standard errors are at most a quarter of a degree, and it is at most ten degrees.
     #[must_use]
     pub fn is_sure(&self) -> bool {
-        self.std_error.iter().all(|error| *error <= SURE) && self.off.norm() <= MOST
+        self.std_error.iter().all(|error| *error <= MAX_STD_ERROR) && self.off.norm() <= MAX_OFFSET
     }
 
     /// The rotation from the camera according to the mount to the true camera.
@@ -60,20 +60,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_camera_that_looks_down_heads_up_in_its_image() {
+    fn a_camera_looking_down_heads_for_a_point_above_its_axis() {
         let degrees = |up: f64, right: f64| Heading {
             off: Vector2::new(up.to_radians(), right.to_radians()),
             std_error: Vector2::new(0.002, 0.001),
         };
         let ahead = degrees(2.0, -1.0).turn().rotate(&Vector3::z());
         assert!(ahead.y < -0.03 && ahead.x < -0.01, "up and left: {ahead}");
-        let said = degrees(2.0, -1.0).to_string();
-        assert!(said.contains("2.0 ± 0.1 degrees down and 1.0 ± 0.1 degrees to the right"));
+        let text = degrees(2.0, -1.0).to_string();
+        assert!(text.contains("2.0 ± 0.1 degrees down and 1.0 ± 0.1 degrees to the right"));
         assert!(degrees(2.0, 1.0).is_sure() && !degrees(9.0, 9.0).is_sure());
-        let vague = Heading {
+        let uncertain = Heading {
             std_error: Vector2::new(0.02, 0.001),
             ..degrees(2.0, 1.0)
         };
-        assert!(!vague.is_sure());
+        assert!(!uncertain.is_sure());
     }
 }

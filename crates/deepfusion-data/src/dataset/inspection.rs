@@ -49,8 +49,8 @@ pub struct Unreadable {
 /// Errors are equal if their messages are.
 impl PartialEq for Unreadable {
     fn eq(&self, other: &Self) -> bool {
-        let said = |one: &Self| (one.path.clone(), one.error.to_string());
-        said(self) == said(other)
+        let key = |one: &Self| (one.path.clone(), one.error.to_string());
+        key(self) == key(other)
     }
 }
 

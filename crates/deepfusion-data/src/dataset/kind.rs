@@ -48,7 +48,7 @@ impl DatasetKind {
         }
     }
     /// Whether its recordings include a calibration, so that none can be given.
-    pub(crate) fn brings_calibration(self) -> bool {
+    pub(crate) fn has_own_calibration(self) -> bool {
         use DatasetKind::{Kitti360, KittiOdometry, KittiRaw, NuScenes};
         matches!(self, KittiRaw | KittiOdometry | Kitti360 | NuScenes)
     }

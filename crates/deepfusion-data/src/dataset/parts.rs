@@ -47,7 +47,7 @@ impl DatasetParts {
             camera: Camera::Left,
             frames,
             intrinsics,
-            cam_from_vehicle: Some(looks_ahead()),
+            cam_from_vehicle: Some(cam_from_vehicle_ahead()),
             track: Some(track.into()),
             yaw_known: false,
             origin_ns: None,
@@ -58,6 +58,6 @@ impl DatasetParts {
 }
 
 /// The transform from the vehicle (x forward, y left, z up) to a camera (x right, y down, z forward) at its origin.
-fn looks_ahead() -> Se3 {
+fn cam_from_vehicle_ahead() -> Se3 {
     Se3::from_quaternion([0.5, 0.5, -0.5, 0.5], Se3::identity().translation())
 }

@@ -18,7 +18,7 @@ pub struct SeenTurn {
 }
 
 /// The track with the turns' roll and pitch, and also their yaw if it has no yaw rate.
-pub(super) fn put_into(track: MotionModel, turns: &[SeenTurn], yaw_known: bool) -> MotionModel {
+pub(super) fn with_turns(track: MotionModel, turns: &[SeenTurn], yaw_known: bool) -> MotionModel {
     // A gap of a single pair is bridged, but no more.
     let longest = turns.iter().map(|turn| turn.to_s - turn.from_s);
     let max_gap_s = 1.5 * longest.fold(0.0, f64::max);
@@ -79,7 +79,7 @@ mod tests {
     /// An hour of weaving with roll and pitch, and a constant drift to one side: between any two images the track turns as
     /// observed, at its end as at its start.
     #[test]
-    fn the_track_turns_as_was_seen() {
+    fn the_track_has_the_observed_turns() {
         let wave = |i: usize, k: f64| (k * i as f64).sin();
         let turns: Vec<SeenTurn> = (0..36_000)
             .map(|i| SeenTurn {
@@ -90,7 +90,7 @@ mod tests {
             })
             .collect();
         for yaw_known in [true, false] {
-            let track = put_into(track(3600), &turns, yaw_known);
+            let track = with_turns(track(3600), &turns, yaw_known);
             for turn in turns.iter().step_by(7) {
                 let moved = track.motion(turn.from_s, turn.to_s).unwrap();
                 let yaw = if yaw_known { 0.002 } else { turn.yaw_rad };
@@ -106,7 +106,7 @@ mod tests {
 
     /// One missing pair is bridged. Two are a gap in the yaw, and count as level if the yaw is measured.
     #[test]
-    fn what_was_not_seen_is_not_made_up() {
+    fn longer_gaps_are_not_bridged() {
         let turn = |i: usize| SeenTurn {
             from_s: 2.0 * i as f64,
             to_s: 2.0 * (i + 1) as f64,
@@ -116,17 +116,17 @@ mod tests {
         let speeds: Vec<_> = (0..=160).map(|i| (0.25 * f64::from(i), 8.0, 0.0)).collect();
         let track: MotionModel = VehicleTrack::new(&speeds).into();
         let seen: Vec<_> = [0, 1, 3, 4, 8, 9].map(turn).into();
-        let unmeasured = put_into(track.clone(), &seen, false);
+        let unmeasured = with_turns(track.clone(), &seen, false);
         for i in [0, 1, 2, 3, 4, 8, 9] {
             let moved = unmeasured.motion(2.0 * i as f64, 2.0 * (i + 1) as f64);
             assert!((moved.unwrap().yaw_rad - 0.1).abs() < 1e-3, "{i}");
         }
         assert!(unmeasured.motion(12.0, 14.0).is_none());
-        let measured = put_into(track, &seen, true);
+        let measured = with_turns(track, &seen, true);
         let tilt = |from_s: f64| measured.motion(from_s, from_s + 2.0).unwrap().tilt_rad;
         assert!((tilt(2.0)[1] - 0.02).abs() < 1e-3);
         assert_eq!(tilt(12.0), [0.0; 2]);
-        let said = warning(&seen, 11, false).to_string();
-        assert!(said.contains("(6 of 10 pairs)"), "{said}");
+        let message = warning(&seen, 11, false).to_string();
+        assert!(message.contains("(6 of 10 pairs)"), "{message}");
     }
 }

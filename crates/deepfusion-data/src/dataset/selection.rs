@@ -17,7 +17,7 @@ impl<'a> Selection<'a> {
     pub(crate) fn new(options: &'a OpenOptions) -> Self {
         let split = options.split.as_ref();
         Self {
-            split: split.map(|split| (split, placed(split))),
+            split: split.map(|split| (split, places_of(split))),
         }
     }
 
@@ -51,7 +51,7 @@ impl<'a> Selection<'a> {
     }
 
     /// The error of a split that selects nothing of `path`; `None` without a split.
-    pub(crate) fn nothing(&self, path: &Path) -> Option<Error> {
+    pub(crate) fn nothing_selected(&self, path: &Path) -> Option<Error> {
         let (split, _) = self.split.as_ref()?;
         let frame = split.entries.first().map(SplitEntry::to_string);
         let scenario = split.scenarios.first().map(|s| format!("scenario = {s}"));
@@ -64,7 +64,7 @@ impl<'a> Selection<'a> {
     }
 }
 
-fn placed(split: &Split) -> HashMap<&SplitEntry, usize> {
+fn places_of(split: &Split) -> HashMap<&SplitEntry, usize> {
     let mut places = HashMap::new();
     for (place, entry) in split.entries.iter().enumerate() {
         places.entry(entry).or_insert(place);

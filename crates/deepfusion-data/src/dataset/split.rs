@@ -139,7 +139,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn both_ways_of_writing_an_index_are_one_frame() {
+    fn padded_and_plain_indices_are_equal() {
         let padded = parse("2011_09_26/2011_09_26_drive_0009_sync 0000000016 l").unwrap();
         let plain = parse("2011_09_26/2011_09_26_drive_0009_sync 16").unwrap();
         assert_eq!(padded, plain);
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_names_without_leading_zeros() {
+    fn numeric_names_lose_leading_zeros() {
         for (written, name) in [
             ("09", "9"),
             ("9", "9"),
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scenario_is_a_line_of_its_own() {
+    fn scenarios_are_read_from_their_own_lines() {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(
             file.path(),
@@ -195,7 +195,7 @@ mod tests {
         }
 
         #[test]
-        fn an_entry_is_read_as_it_is_shown(frame in any::<u64>(), right in any::<bool>()) {
+        fn a_printed_entry_is_read_back(frame in any::<u64>(), right in any::<bool>()) {
             let camera = if right { Camera::Right } else { Camera::Left };
             let entry = SplitEntry { folder: "d/e_sync".into(), frame, camera };
             prop_assert_eq!(parse(&entry.to_string()).unwrap(), entry);

@@ -17,7 +17,7 @@ pub enum TopicRole {
     Dynamic,
     /// The inertial unit.
     Imu,
-    /// The vehicle's speed, or the satellite positions that it is computed from.
+    /// The vehicle's speed, or the GPS positions from which it is computed.
     Speed,
     /// The steering angle.
     Steering,
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read_again() {
+    fn the_written_form_is_read_back() {
         for role in TopicRole::ALL {
             let text = format!("{role}=/a/b");
             let read: NamedTopic = text.parse().unwrap();

@@ -55,7 +55,7 @@ mod tests {
 
     /// One of each kind; all messages of a kind are tested in its own file.
     #[test]
-    fn a_warning_says_what_its_kind_says() {
+    fn a_warning_has_the_message_of_its_kind() {
         let ends_early = SourceDamage::new(std::io::Error::other("it ends early"));
         let warnings: [DataWarning; 7] = [
             CameraWarning::LensCorrected.into(),
@@ -68,7 +68,7 @@ mod tests {
             },
             DataWarning::Other("its gyroscope was warm".into()),
         ];
-        let said = [
+        let expected = [
             "the images are corrected for lens distortion; fx, fy, cx, cy are those of the corrected images",
             "the LiDAR's mount is not given (cam_from_lidar): its scans give no ground truth",
             "the video has no time stamps: set fps in dataset.toml",
@@ -77,6 +77,6 @@ mod tests {
             "the video's folder is not writable: decoded frames are kept in frames (set cache in dataset.toml for another folder)",
             "its gyroscope was warm",
         ];
-        assert_eq!(warnings.map(|warning| warning.to_string()), said);
+        assert_eq!(warnings.map(|warning| warning.to_string()), expected);
     }
 }

@@ -51,14 +51,14 @@ pub enum CalibrationFileProblem {
         found: usize,
     },
     /// A matrix's length differs from its `rows` times `cols`.
-    #[error("{field}: {}, but its rows and cols make {said}", count_of(*found, "number"))]
+    #[error("{field}: {}, but its rows and cols make {expected}", count_of(*found, "number"))]
     MatrixSize {
         /// The matrix's field.
         field: &'static str,
         /// How many numbers it has.
         found: usize,
         /// `rows` times `cols`.
-        said: u64,
+        expected: u64,
     },
     /// The distortion coefficients are invalid.
     #[error("distortion coefficients: {0}")]

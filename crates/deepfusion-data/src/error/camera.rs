@@ -22,12 +22,12 @@ pub enum CameraProblem {
     #[error(transparent)]
     CameraInfo(#[from] CameraInfoProblem),
     /// A recording's images were taken with different focal lengths.
-    #[error("EXIF says {said}, but {other_said} in {other}")]
+    #[error("EXIF says {entry}, but {other_entry} in {other}")]
     Zoomed {
         /// This image's EXIF entry about its focal length.
-        said: String,
+        entry: String,
         /// The other image's entry.
-        other_said: String,
+        other_entry: String,
         /// The other image's name.
         other: String,
     },

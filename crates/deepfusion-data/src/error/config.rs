@@ -103,7 +103,7 @@ impl From<toml::de::Error> for ConfigProblem {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum ExpectedValue {
-    /// A finite number; the key's name says of what.
+    /// A finite number, whose quantity and unit are in the key's name.
     AsNamed,
     /// Above 0.
     Positive,
@@ -135,10 +135,7 @@ impl fmt::Display for ExpectedValue {
             }
             Self::SpeedScale => {
                 let (least, most) = (SPEED_SCALES.start(), SPEED_SCALES.end());
-                write!(
-                    f,
-                    ", expected {least} to {most} (a unit is converted, not scaled)"
-                )
+                write!(f, ", expected {least} to {most} (not for converting units)")
             }
         }
     }
@@ -147,6 +144,6 @@ impl fmt::Display for ExpectedValue {
 fn there_are(frames: &[String]) -> String {
     match frames {
         [] => "the bag has no transforms".to_owned(),
-        names => format!("the bag's transforms have {}", names.join(", ")),
+        names => format!("the bag's frames are {}", names.join(", ")),
     }
 }

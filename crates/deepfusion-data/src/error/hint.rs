@@ -182,7 +182,7 @@ mod tests {
 
     /// Pages are named by URL, because users with only the program do not have the repository's files.
     #[test]
-    fn pages_are_named_by_their_address() {
+    fn pages_are_named_by_url() {
         let path = "x".into();
         let unknown = Error::UnknownLayout {
             path,

@@ -23,7 +23,7 @@ pub enum CalibrationProblem {
         /// The number, as written.
         text: String,
     },
-    /// It has too many numbers, or too few.
+    /// The field has too many numbers, or too few.
     #[error("{}, expected {expected}", count_of(*found, "number"))]
     Length {
         /// How many numbers it has.
@@ -52,11 +52,11 @@ pub enum CalibrationProblem {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum OxtsField {
-    /// One of its values.
+    /// One of the packet's values.
     Value {
         /// Its name, such as `vf`.
         name: &'static str,
-        /// Which it is, counted from 1.
+        /// Its position in the packet, counted from 1.
         number: usize,
     },
     /// The whole packet.
@@ -88,7 +88,7 @@ pub enum OxtsProblem {
         /// The value.
         value: f64,
     },
-    /// It has too many values, or too few.
+    /// The packet has too many values, or too few.
     #[error("{}, expected 30", count_of(*found, "value"))]
     Length {
         /// How many values it has.

@@ -117,7 +117,7 @@ pub enum TrackletsProblem {
     Count {
         /// What is counted.
         of: TrackletPart,
-        /// How many there are.
+        /// How many elements the file has.
         found: usize,
         /// The stated count.
         announced: usize,

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 /// The video in a folder.
 #[derive(Debug)]
-pub(crate) struct InFolder {
+pub(crate) struct FolderVideo {
     pub(crate) file: PathBuf,
     /// Whether it is named in `dataset.toml`.
     pub(crate) named: bool,
@@ -29,13 +29,13 @@ pub(crate) struct InFolder {
 ///
 /// # Errors
 /// [`Error::Config`] if a named video does not exist, or none is named and there are several.
-pub(crate) fn in_folder(folder: &Path) -> Result<Option<InFolder>> {
+pub(crate) fn in_folder(folder: &Path) -> Result<Option<FolderVideo>> {
     let config = FolderConfig::read(folder)?;
     if config.images.is_some() {
         return Ok(None);
     }
     if let Some(named) = config.find(folder, "video", config.video.as_ref(), &[])? {
-        return Ok(Some(InFolder {
+        return Ok(Some(FolderVideo {
             file: named,
             named: true,
         }));
@@ -49,7 +49,7 @@ pub(crate) fn in_folder(folder: &Path) -> Result<Option<InFolder>> {
     }
     match videos.len() {
         0 => Ok(None),
-        1 => Ok(videos.pop().map(|file| InFolder { file, named: false })),
+        1 => Ok(videos.pop().map(|file| FolderVideo { file, named: false })),
         count => Err(config.error(ConfigProblem::SeveralVideos { count })),
     }
 }
@@ -83,7 +83,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         (other, _) => other,
     })?;
     let model = lens.as_ref().map(|lens| lens.model.clone());
-    let bent = lens.and_then(|lens| bent_warning(&lens, &calibration));
+    let bent = lens.and_then(|lens| lens_warning(&lens, &calibration));
     warnings.extend(bent.map(DataWarning::from));
     let times = match (video.times_ns(), config.fps) {
         (_, Some(fps)) => {
@@ -101,7 +101,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         let (created, log) = (video.created_ns()?, speeds.as_ref()?);
         let ns = &log.speeds_mps.ns;
         let log = (*ns.first()?, *ns.last()?);
-        let start_ns = begun(created, &times, log)?;
+        let start_ns = start_of(created, &times, log)?;
         warnings.push(TimesWarning::VideoBegins { start_ns }.into());
         let zone = zone_warning(created, &times, log, model);
         warnings.extend(zone.map(DataWarning::from));
@@ -149,7 +149,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
 
 /// The warning about a GoPro's video that was not filmed through the linear lens; `None` if the calibration includes a lens
 /// distortion.
-fn bent_warning(lens: &GoproLens, calibration: &CameraCalibration) -> Option<CameraWarning> {
+fn lens_warning(lens: &GoproLens, calibration: &CameraCalibration) -> Option<CameraWarning> {
     if lens.is_linear() || calibration.distortion != Distortion::default() {
         return None;
     }
@@ -189,7 +189,7 @@ fn no_pinhole(video: &Path, lens: &GoproLens) -> Error {
 /// The beginning of a video whose times count from 0, for speeds with dates. The recorder's date is that of the first or the last
 /// frame; the choice that puts more of the video within the log is used. `None` if the video's times are dates themselves, or the log's are
 /// not.
-fn begun(created_ns: i64, times: &[Option<i64>], log: (i64, i64)) -> Option<i64> {
+fn start_of(created_ns: i64, times: &[Option<i64>], log: (i64, i64)) -> Option<i64> {
     let first = (*times.first()?)?;
     let is_date = |ns: i64| TimeUnit::of_date(ns as f64).is_some();
     if is_date(first) || !is_date(log.0) {
@@ -228,7 +228,7 @@ fn zone_warning(
     let length_ns = length_ns(times)?;
     let in_zone = |ahead_min: i64| {
         let utc_ns = created_ns.saturating_sub(ahead_min * MINUTE_NS);
-        let start_ns = begun(utc_ns, times, log)?;
+        let start_ns = start_of(utc_ns, times, log)?;
         let within_ns = within_ns(start_ns, length_ns, log);
         (within_ns > 0).then_some(InZone {
             ahead_min,
@@ -312,43 +312,46 @@ mod tests {
 
     /// A minute of video whose recorder wrote local summer time, and logs in UTC.
     #[test]
-    fn local_time_beside_a_log_in_utc_is_warned_of() {
+    fn local_time_with_a_log_in_utc_gives_a_warning() {
         const S: i64 = 1_000_000_000;
         const H: i64 = 3600 * S;
         let day = 1_700_000_000 * S;
         let (half_an_hour, five_hours) = ((day, day + H / 2), (day, day + 5 * H));
         let times = [Some(0), Some(60 * S)];
-        let said = |created: i64, log: (i64, i64), gopro: Option<&str>| {
+        let warning = |created: i64, log: (i64, i64), gopro: Option<&str>| {
             zone_warning(created, &times, log, gopro.map(str::to_owned))
         };
         let began = day + 60 * S;
         let beside = |moved_ns| Some(TimesWarning::VideoBesideLog { moved_ns });
-        assert_eq!(said(began, half_an_hour, None), None);
-        assert_eq!(said(began + 2 * H, half_an_hour, None), beside(Some(began)));
+        assert_eq!(warning(began, half_an_hour, None), None);
+        assert_eq!(
+            warning(began + 2 * H, half_an_hour, None),
+            beside(Some(began))
+        );
         let in_india = began + 5 * H + H / 2;
-        assert_eq!(said(in_india, half_an_hour, None), beside(Some(began)));
-        assert_eq!(said(day - 9 * 24 * H, half_an_hour, None), beside(None));
+        assert_eq!(warning(in_india, half_an_hour, None), beside(Some(began)));
+        assert_eq!(warning(day - 9 * 24 * H, half_an_hour, None), beside(None));
         // Several time zones put the video within a long log, and none is likelier.
-        assert_eq!(said(began + 6 * H, five_hours, None), beside(None));
+        assert_eq!(warning(began + 6 * H, five_hours, None), beside(None));
         // A video of a single frame can be within its log too.
         assert_eq!(zone_warning(day, &[Some(0)], half_an_hour, None), None);
     }
 
     /// A GoPro's clock may show UTC, which a short log can confirm.
     #[test]
-    fn a_gopro_is_warned_of_where_its_clock_may_show_another_zone() {
+    fn a_gopro_gives_a_warning_if_another_time_zone_is_possible() {
         const S: i64 = 1_000_000_000;
         const H: i64 = 3600 * S;
         let day = 1_700_000_000 * S;
         let times = [Some(0), Some(60 * S)];
-        let said = |log| zone_warning(day + 60 * S, &times, log, Some("HERO11 Black".into()));
+        let warning = |log| zone_warning(day + 60 * S, &times, log, Some("HERO11 Black".into()));
         let model = "HERO11 Black".to_owned();
         let recorder = TimesWarning::LocalRecorder { model };
-        assert_eq!(said((day, day + H / 2)), None);
-        assert_eq!(said((day, day + 4 * H)), Some(recorder.clone()));
+        assert_eq!(warning((day, day + H / 2)), None);
+        assert_eq!(warning((day, day + 4 * H)), Some(recorder.clone()));
         // In the zone one hour off, first more, then less of it is within the log.
-        assert_eq!(said((day + 90 * S, day + 2 * H)), Some(recorder));
-        assert_eq!(said((day, day + H + 30 * S)), None);
+        assert_eq!(warning((day + 90 * S, day + 2 * H)), Some(recorder));
+        assert_eq!(warning((day, day + H + 30 * S)), None);
     }
 
     /// A minute of video, with the date that each of the two kinds of recorders writes.
@@ -359,28 +362,32 @@ mod tests {
         let times = [Some(0), Some(30 * S), Some(60 * S)];
         let log = (day, day + 60 * S);
         assert_eq!(
-            begun(day, &times, log),
+            start_of(day, &times, log),
             Some(day),
             "the date is that of the first frame"
         );
         assert_eq!(
-            begun(day + 60 * S, &times, log),
+            start_of(day + 60 * S, &times, log),
             Some(day),
             "the date is that of the last frame"
         );
         let longer = (day - 600 * S, day + 600 * S);
         assert_eq!(
-            begun(day, &times, longer),
+            start_of(day, &times, longer),
             Some(day),
             "both fit: the first frame is used"
         );
         assert_eq!(
-            begun(day, &times, (0, 60 * S)),
+            start_of(day, &times, (0, 60 * S)),
             None,
             "the log's times count from 0 too"
         );
         let dates = times.map(|t| t.map(|t| t + day));
-        assert_eq!(begun(day, &dates, log), None, "the video's times are dates");
-        assert_eq!(begun(day, &[None], log), None);
+        assert_eq!(
+            start_of(day, &dates, log),
+            None,
+            "the video's times are dates"
+        );
+        assert_eq!(start_of(day, &[None], log), None);
     }
 }

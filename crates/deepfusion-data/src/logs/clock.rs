@@ -118,7 +118,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn dates_tell_their_unit() {
+    fn the_unit_of_dates_is_recognised() {
         for (number, unit) in [
             (1_317_042_272.345, Some(TimeUnit::Seconds)),
             (1.317_042_272e12, Some(TimeUnit::Milliseconds)),
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn small_steps_are_seconds_and_others_are_not_guessed() {
+    fn small_steps_are_seconds_and_larger_ones_are_ambiguous() {
         assert_eq!(
             TimeUnit::of_numbers(&[0.0, 0.1, 0.2]),
             Some(TimeUnit::Seconds)

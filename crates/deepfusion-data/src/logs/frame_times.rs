@@ -136,7 +136,7 @@ fn numbers(images: &[PathBuf], times_ns: Option<&[i64]>) -> Vec<u64> {
 }
 
 /// Most numbers that are left out in a pause.
-const MOST_MISSING: f64 = 1e5;
+const MAX_MISSING: f64 = 1e5;
 
 /// Frame numbers that leave out as many numbers as frames are missing in a pause.
 pub(crate) fn numbers_by_time(times_ns: &[i64]) -> Vec<u64> {
@@ -154,7 +154,7 @@ pub(crate) fn numbers_by_time(times_ns: &[i64]) -> Vec<u64> {
             1.0
         };
         // Limit long breaks, so that loops over all numbers do not take forever.
-        next += frames.clamp(1.0, MOST_MISSING) as u64;
+        next += frames.clamp(1.0, MAX_MISSING) as u64;
         numbers.push(next);
     }
     numbers

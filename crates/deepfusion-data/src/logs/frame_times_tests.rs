@@ -20,7 +20,7 @@ fn timed(names: &[&str], files: &[(&str, &str)]) -> Result<Vec<(u64, Option<i64>
 const MS: i64 = 1_000_000;
 
 #[test]
-fn names_that_are_dates_are_times() {
+fn dates_in_names_are_times() {
     // EuRoC: nanoseconds; one frame is missing before the last.
     let names = [
         "1403636579763555584",
@@ -59,7 +59,7 @@ fn numbers_are_kept_and_need_a_rate() {
 
 /// With `fps`, EuRoC's names are not used as frame numbers: the frames would be years apart.
 #[test]
-fn a_rate_counts_frames_whose_names_are_dates() {
+fn with_fps_dates_in_names_are_not_frame_numbers() {
     let names = ["1403636579763555584", "1403636579813555456"];
     let found = timed(&names, &[("dataset.toml", "fps = 20")]).unwrap();
     let times: Vec<_> = found.iter().map(|(_, ns)| ns.unwrap()).collect();
@@ -68,7 +68,7 @@ fn a_rate_counts_frames_whose_names_are_dates() {
 
 /// As `ffmpeg frame_%d.png` writes them.
 #[test]
-fn numbers_in_names_need_no_zeros() {
+fn numbers_in_names_need_no_leading_zeros() {
     let names: Vec<String> = (1..=12).map(|i| format!("frame_{i}")).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let config = FolderConfig {
@@ -87,7 +87,7 @@ fn numbers_in_names_need_no_zeros() {
 }
 
 #[test]
-fn a_break_of_years_takes_a_bounded_number_of_numbers() {
+fn a_break_of_years_leaves_out_a_limited_range_of_numbers() {
     let numbers = numbers_by_time(&[0, 100 * MS, 200 * MS, 1 << 60, (1 << 60) + 100 * MS]);
     assert_eq!(numbers, [0, 1, 2, 100_002, 100_003]);
 }
@@ -119,7 +119,7 @@ fn dates_with_a_zone_are_read() {
 
 /// Dates without a time zone would be off by hours from a log in UTC if they are local.
 #[test]
-fn dates_without_a_zone_are_warned_of_once_a_list() {
+fn dates_without_a_zone_give_one_warning_per_list() {
     let warned = |list: &str| {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("times.txt"), list).unwrap();
@@ -143,7 +143,7 @@ fn dates_without_a_zone_are_warned_of_once_a_list() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn invalid_lists_and_tables_are_errors() {
     for (file, text, problem) in [
         ("timestamps.txt", "0.5\n", "1 time, but there are 2 images"),
         (

@@ -8,7 +8,7 @@ const MAX_GAP_S: f64 = 0.5;
 /// Longer steps are filled with samples at most this far apart.
 const SLOW_S: f64 = 0.25;
 /// Longest gap of a slow log that is bridged by default: too short for a vehicle to stop and start again.
-const MOST_BRIDGED_S: f64 = 3.5;
+const MAX_BRIDGED_S: f64 = 3.5;
 
 /// Values at times, on the recording's clock.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +34,7 @@ impl Samples {
         steps.sort_by(f64::total_cmp);
         let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
         let most = most.unwrap_or(if usual > SLOW_S {
-            (3.0 * usual).min(MOST_BRIDGED_S)
+            (3.0 * usual).min(MAX_BRIDGED_S)
         } else {
             MAX_GAP_S
         });

@@ -238,8 +238,8 @@ fn own_or_foreign(path: &Path, config: &FolderConfig) -> Result<LogFile> {
     let is_table = path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("csv"));
-    let said = options.time.is_some() || options.speed.is_some() || options.dbc.is_some();
-    if said || path.is_dir() || !is_table {
+    let configured = options.time.is_some() || options.speed.is_some() || options.dbc.is_some();
+    if configured || path.is_dir() || !is_table {
         return Ok(foreign()?);
     }
     let own = Table::read(path).and_then(|table| {

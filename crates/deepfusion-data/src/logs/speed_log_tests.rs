@@ -61,8 +61,8 @@ fn times_may_be_dates() {
         );
         let log = read(&[("speed.csv", &table)]).unwrap();
         assert_eq!(log.speeds_mps.ns, [start, start + tenth], "{zone}");
-        let said = text_of(&log).contains("assuming UTC");
-        assert_eq!(said, warned, "{zone}");
+        let warns = text_of(&log).contains("assuming UTC");
+        assert_eq!(warns, warned, "{zone}");
     }
     // Either all times in a column have a zone, or none.
     let mixed = "timestamp,speed_mps\n2024-05-01T10:00:00Z,3\n2024-05-01T10:00:01,4\n";
@@ -106,8 +106,8 @@ fn a_unit_is_never_guessed() {
     )]);
     let log = log.unwrap();
     assert_eq!(log.speeds_mps.ns[0], 1_403_636_579_763_555_584);
-    let said = log.warnings[0].to_string();
-    assert!(said.contains("assuming ns"), "{said}");
+    let message = log.warnings[0].to_string();
+    assert!(message.contains("assuming ns"), "{message}");
 }
 
 #[test]
@@ -150,13 +150,13 @@ fn bad_rows_are_named() {
 #[test]
 fn repeated_times_and_slow_clocks_are_reported() {
     let log = read(&[("speed.csv", "time_s,speed_mps\n0,1\n0,2\n0.1,1\n")]).unwrap();
-    let said = text_of(&log);
+    let text = text_of(&log);
     assert!(
-        said.contains("1 row repeats the time of the row above (in line 3)"),
-        "{said}"
+        text.contains("1 row repeats the time of the row above (in line 3)"),
+        "{text}"
     );
     assert_eq!(log.track(0).times_s(), [0.0, 0.1]);
-    assert!(!said.contains("gap"), "{said}");
+    assert!(!text.contains("gap"), "{text}");
 }
 
 /// One speed per second, as GPS receivers and phones write it, is bridged. A gap in it is not, nor is one in a fast log, unless
@@ -193,7 +193,7 @@ fn slow_logs_are_bridged() {
 }
 
 #[test]
-fn a_track_stands_for_speeds() {
+fn a_gps_track_gives_speeds() {
     let point = |i: i32| {
         format!(
             "<trkpt lat=\"{:.7}\" lon=\"8.4\"><time>2026-05-01T12:00:{i:02}Z</time></trkpt>",
@@ -209,8 +209,8 @@ fn a_track_stands_for_speeds() {
     .unwrap();
     let speed = log.speeds_mps.at(1_777_636_805_400_000_000).unwrap();
     assert!((speed - 0.5 * 11.12).abs() < 0.02, "{speed}");
-    let said = text_of(&log);
-    assert!(said.contains("from its positions, smoothed"), "{said}");
+    let text = text_of(&log);
+    assert!(text.contains("from its positions, smoothed"), "{text}");
     let error = refusal(&[("a.gpx", &gpx), ("b.gpx", &gpx)]);
     assert!(
         error.to_string().contains("the folder has 2 tracks"),
@@ -271,7 +271,7 @@ fn turning_unit(header: &str, rates: f64, accelerations: f64) -> String {
 }
 
 #[test]
-fn a_whole_inertial_unit_is_fused_with_the_speed() {
+fn a_complete_inertial_unit_is_fused_with_the_speed() {
     let mut speed = "time_s,speed_mps\n".to_owned();
     (0..=50).for_each(|i| speed += &format!("{},10\n", f64::from(i) * 0.1));
     let mount = "[vehicle_from_imu]\nrotation = [0.0, 0.0, 1.5707963]\n";
@@ -334,13 +334,13 @@ fn units_of_an_inertial_unit_are_never_guessed() {
 }
 
 #[test]
-fn the_course_of_positions_is_read_where_no_yaw_rate_is() {
+fn the_course_of_positions_is_read_only_without_a_yaw_rate() {
     let speed = ("speed.csv", "time_s,speed_mps\n0,10\n1,10\n");
     let course = ("course.csv", "time_s,course_rate_radps\n0,0.1\n1,0.2\n");
     let rates = |files: &[(&str, &str)]| {
         let log = read(files).unwrap();
-        let said = text_of(&log);
-        (log.course_rates_radps.map(|c| c.values), said)
+        let warnings = text_of(&log);
+        (log.course_rates_radps.map(|c| c.values), warnings)
     };
     assert_eq!(rates(&[speed, course]).0, Some(vec![0.1, 0.2]));
     let with_yaw = (

@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn headers_are_taken_apart() {
+    fn headers_are_split_into_name_and_unit() {
         for (header, name, unit) in [
             ("speed_kmh", "speed", Some("kmh")),
             ("#timestamp [ns]", "timestamp", Some("ns")),

@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn near_is_red_far_is_blue_and_the_rest_stays() {
+    fn near_depths_are_red_and_far_ones_blue() {
         let mut depth = DepthMap::empty(8, 4);
         depth.set_nearest(0, 0, 2.0);
         depth.set_nearest(4, 1, 70.0);
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn another_size_is_an_error() {
+    fn a_depth_map_of_another_size_is_an_error() {
         let error = overlay(&RgbImage::new(3, 2), &DepthMap::empty(4, 2)).unwrap_err();
         assert!(error.to_string().contains("4x2"), "{error}");
     }

@@ -35,7 +35,7 @@ impl GtKind {
 #[non_exhaustive]
 #[error("unknown ground-truth depth '{text}', expected z, velodyne or annotated")]
 pub struct NoSuchDepth {
-    /// The text.
+    /// The text given.
     pub text: String,
 }
 

@@ -26,7 +26,7 @@ pub(super) fn open_with(bag: &Path, topics: &[&str]) -> Result<Dataset, Error> {
     Ok(Dataset::open(bag, &options)?.remove(0))
 }
 
-pub(super) fn says(text: &str, parts: &[&str]) {
+pub(super) fn assert_contains(text: &str, parts: &[&str]) {
     for part in parts {
         assert!(text.contains(part), "`{part}` is not in: {text}");
     }

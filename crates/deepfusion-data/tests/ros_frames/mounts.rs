@@ -1,6 +1,6 @@
 //! Mounts from the frames of `/tf_static` and `/tf`, in combination with a file or a profile.
 
-use super::common::{Drive, OPTICAL, STILL, camera, is_near, open, says};
+use super::common::{Drive, OPTICAL, STILL, assert_contains, camera, is_near, open};
 use crate::common::bag::TinyBag;
 use crate::common::text_of;
 use deepfusion_data::{Dataset, Error, GtKind};
@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use std::fs;
 
 #[test]
-fn the_file_goes_before_the_frames_and_a_disagreement_is_reported() {
+fn the_file_takes_precedence_over_the_frames_and_a_disagreement_is_reported() {
     // The camera 1.5 m ahead and 1.2 m up.
     let place = [1.5, 0.0, 1.2];
     let frames = |bag: &mut TinyBag| {
@@ -17,10 +17,10 @@ fn the_file_goes_before_the_frames_and_a_disagreement_is_reported() {
             vec![("base_link", "camera", place, OPTICAL)]
         });
     };
-    let alone = Drive::new("", frames).opened();
-    is_near(&camera(&alone).0, place);
-    is_near(&camera(&alone).1, [1.0, 0.0, 0.0]);
-    let warnings = text_of(alone.warnings());
+    let by_frames = Drive::new("", frames).opened();
+    is_near(&camera(&by_frames).0, place);
+    is_near(&camera(&by_frames).1, [1.0, 0.0, 0.0]);
+    let warnings = text_of(by_frames.warnings());
     assert!(!warnings.contains("cam_from_vehicle"), "{warnings}");
 
     let file = |x: f64| {
@@ -33,7 +33,7 @@ fn the_file_goes_before_the_frames_and_a_disagreement_is_reported() {
     assert!(!text_of(same.warnings()).contains("apart"));
     let other = Drive::new(&file(-1.9), frames).opened();
     is_near(&camera(&other).0, [1.9, 0.0, 1.2]);
-    says(
+    assert_contains(
         &text_of(other.warnings()),
         &[
             "cam_from_vehicle",
@@ -44,7 +44,7 @@ fn the_file_goes_before_the_frames_and_a_disagreement_is_reported() {
 }
 
 #[test]
-fn the_frames_go_before_a_profile() {
+fn the_frames_take_precedence_over_a_profile() {
     let lidar = |bag: &mut TinyBag| {
         bag.within("lidar").scans("/points");
     };
@@ -69,7 +69,7 @@ fn the_frames_go_before_a_profile() {
     // 0.3 m above the camera, where its y looks down.
     is_near(&mount(&both).translation.into(), [0.0, -0.3, 0.0]);
     assert_eq!(mount(&both).source, "frames lidar → base_link → camera");
-    says(&text_of(both.warnings()), &["the profile umad", "apart"]);
+    assert_contains(&text_of(both.warnings()), &["the profile umad", "apart"]);
     assert!(both.has_ground_truth(3, GtKind::Z));
 }
 
@@ -93,7 +93,7 @@ fn two_parents_are_refused_with_both_chains() {
         [1.5, 0.0, 1.5],
     );
     let text = Drive::new("", frames(0.25)).refusal();
-    says(
+    assert_contains(
         &text,
         &[
             "drive.bag: cam_from_vehicle is ambiguous",
@@ -116,7 +116,7 @@ fn two_parents_are_refused_with_both_chains() {
 }
 
 #[test]
-fn the_vehicles_frame_is_the_likeliest_and_of_two_the_file_says_which() {
+fn the_likeliest_vehicle_frame_is_used_and_the_file_decides_between_two() {
     // A rear axle takes precedence over base_link, wherever that is.
     let axle = Drive::new("", |bag| {
         bag.transforms("/tf_static", |_| {
@@ -139,7 +139,7 @@ fn the_vehicles_frame_is_the_likeliest_and_of_two_the_file_says_which() {
             });
         })
     };
-    says(
+    assert_contains(
         &two("").refusal(),
         &[
             "car_1/base_link and car_2/base_link could both be the vehicle's frame",
@@ -148,7 +148,7 @@ fn the_vehicles_frame_is_the_likeliest_and_of_two_the_file_says_which() {
     );
     let named = two("[frames]\nvehicle = \"car_2/base_link\"\n").opened();
     is_near(&camera(&named).0, [1.0, 0.0, 1.2]);
-    says(
+    assert_contains(
         &two("[frames]\nvehicle = \"car_3\"\n").refusal(),
         &[
             "frames.vehicle: car_3 is in no transform",
@@ -173,7 +173,7 @@ fn a_camera_that_pans_has_no_mount() {
     });
     let dataset = drive.opened();
     let warnings = text_of(dataset.warnings());
-    says(
+    assert_contains(
         &warnings,
         &[
             "cam_from_vehicle: the frames base_link and camera are not fixed to each other",
@@ -199,7 +199,7 @@ fn a_camera_that_pans_has_no_mount() {
 /// A scan whose point is measured 40 ms after the time in its header, at 10 m/s; according to the file, its driver does not compensate for
 /// motion.
 #[test]
-fn a_point_with_a_time_of_its_own_is_brought_to_the_frame_from_there() {
+fn points_are_moved_to_the_frame_from_their_own_time() {
     let depth = |sidecar: &str, after_s: f32| {
         let drive = Drive::new(sidecar, |bag| {
             bag.within("lidar").timed_scans("/points", after_s);
@@ -221,11 +221,11 @@ fn a_point_with_a_time_of_its_own_is_brought_to_the_frame_from_there() {
         "{at_once} {by_point}"
     );
     let text = depth(named, 5.0).unwrap_err().to_string();
-    says(&text, &["/points", "time", "more than 1 s"]);
+    assert_contains(&text, &["/points", "time", "more than 1 s"]);
 }
 
 #[test]
-fn a_frame_that_is_not_optical_is_reported_and_turned() {
+fn a_frame_that_is_not_optical_is_reported_and_rotated() {
     let drive = Drive::new("", |bag| {
         bag.within("lidar").scans("/points");
         bag.transforms("/tf_static", |_| {
@@ -244,7 +244,7 @@ fn a_frame_that_is_not_optical_is_reported_and_turned() {
         "{ahead}"
     );
     let warnings = text_of(dataset.warnings());
-    says(&warnings, &["the images' frame camera has its z axis up"]);
+    assert_contains(&warnings, &["the images' frame camera has its z axis up"]);
     // The scan's point is 10 m ahead of the LiDAR, 0.4 m higher than the camera, so it is in the image.
     let lidar = dataset.mounts().iter().find(|m| m.name == "cam_from_lidar");
     let cam_from_lidar = Se3::from_axis_angle(
@@ -256,7 +256,7 @@ fn a_frame_that_is_not_optical_is_reported_and_turned() {
 }
 
 #[test]
-fn frames_that_lead_nowhere_are_errors() {
+fn missing_frames_are_reported() {
     // The images' frame is in no transform.
     let missing = Drive::new("", |bag| {
         bag.transforms("/tf_static", |_| {
@@ -264,7 +264,7 @@ fn frames_that_lead_nowhere_are_errors() {
         });
     });
     let warnings = text_of(missing.opened().warnings());
-    says(
+    assert_contains(
         &warnings,
         &[
             "the frame of the images, camera, is in no transform",
@@ -289,7 +289,7 @@ fn frames_that_lead_nowhere_are_errors() {
         });
     });
     let warnings = text_of(nameless.opened().warnings());
-    says(
+    assert_contains(
         &warnings,
         &[
             "camera, chassis is known as the vehicle's",
@@ -308,7 +308,7 @@ fn frames_that_lead_nowhere_are_errors() {
 }
 
 #[test]
-fn a_turned_inertial_unit_turns_the_vehicle_as_its_frame_says() {
+fn the_inertial_units_frame_corrects_its_orientation() {
     // Upside down: its z points down, so it measures the opposite rate, and gravity's reaction along -z.
     let upside_down = [std::f64::consts::PI, 0.0, 0.0];
     let drive = |frames: bool| {
@@ -329,5 +329,5 @@ fn a_turned_inertial_unit_turns_the_vehicle_as_its_frame_says() {
     assert!((turn + 0.1).abs() < 5e-3, "{turn}");
     // Without frames it is assumed to lie flat, which gravity contradicts.
     let text = drive(false).refusal();
-    says(&text, &["180", "vehicle_from_imu"]);
+    assert_contains(&text, &["180", "vehicle_from_imu"]);
 }

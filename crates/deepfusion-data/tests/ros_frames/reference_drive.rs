@@ -1,6 +1,6 @@
 //! A complete drive written by another program, with known ground truth.
 
-use super::common::{open, reference, says};
+use super::common::{assert_contains, open, reference};
 use crate::common::text_of;
 use deepfusion_data::{Dataset, GtKind, inspect};
 use deepfusion_geometry::Se3;
@@ -70,7 +70,7 @@ fn is_the_drive(dataset: &Dataset, known: &DriveFacts) {
 
     let warnings = text_of(dataset.warnings());
     assert!(!warnings.contains("not given"), "{warnings}");
-    says(
+    assert_contains(
         &warnings,
         &[
             "/gnss/fix: 1 of 10 messages left out for lack of a position",
@@ -98,7 +98,7 @@ fn a_drive_needs_no_file_beside_it() {
 
     let seen = inspect(&reference("drive.bag")).unwrap();
     let text = seen.to_string();
-    says(
+    assert_contains(
         &text,
         &[
             "cam_from_vehicle",
@@ -110,6 +110,6 @@ fn a_drive_needs_no_file_beside_it() {
 
 #[cfg(feature = "ros2")]
 #[test]
-fn the_same_drive_of_ros_2_needs_none_either() {
+fn the_same_drive_in_ros_2_needs_no_file_either() {
     is_the_drive(&open(&reference("drive_ros2")).unwrap(), &facts());
 }

@@ -1,12 +1,12 @@
 //! Which topics are read, and the speeds from them.
 
-use super::common::{Drive, open, open_with, refusal, says};
+use super::common::{Drive, assert_contains, open, open_with, refusal};
 use crate::common::bag::{CAMERA, TinyBag};
 use crate::common::text_of;
 use deepfusion_data::{Dataset, Error, OpenOptions, write_bag_config};
 
 #[test]
-fn the_speeds_messages_are_read_and_positions_come_last() {
+fn speeds_in_messages_take_precedence_over_positions() {
     let speed = |fill: fn(&mut TinyBag)| {
         let dataset = Drive::bare(CAMERA, |bag| {
             bag.images("/image");
@@ -49,11 +49,11 @@ fn the_speeds_messages_are_read_and_positions_come_last() {
         },
     )
     .refusal();
-    says(&error, &["vehicle.max_gap_s is 0"]);
+    assert_contains(&error, &["vehicle.max_gap_s is 0"]);
 }
 
 #[test]
-fn a_topic_is_named_by_a_caller() {
+fn callers_can_name_topics() {
     let drive = Drive::bare(
         "[vehicle]\nspeed_unit = \"km/h\"\n[topics]\nspeed = \"/speed\"\n",
         |bag| {
@@ -67,7 +67,7 @@ fn a_topic_is_named_by_a_caller() {
         },
     );
     let text = drive.refusal();
-    says(
+    assert_contains(
         &text,
         &[
             "2 topics could be the image",
@@ -96,9 +96,9 @@ fn a_topic_is_named_by_a_caller() {
     assert_eq!(other.intrinsics(0).fx, 60.0);
     assert!((other.frames()[12].speed_mps.unwrap() - 12.0).abs() < 0.05);
     let text = refusal(open_with(&drive.bag, &["image=/rear/image_raw"]));
-    says(&text, &["no topic /rear/image_raw", "/front/image_raw, "]);
+    assert_contains(&text, &["no topic /rear/image_raw", "/front/image_raw, "]);
     let text = refusal(open_with(&drive.bag, &["image=/twist"]));
-    says(
+    assert_contains(
         &text,
         &[
             "/twist has messages of the wrong type geometry_msgs/TwistStamped",
@@ -110,12 +110,12 @@ fn a_topic_is_named_by_a_caller() {
     let picture = deepfusion_data::RgbImage::new(8, 8);
     deepfusion_data::save_png(&picture, &folder.path().join("0.png")).unwrap();
     let text = refusal(open_with(folder.path(), &["image=/twist"]));
-    says(&text, &["image=/twist", "has no topics"]);
+    assert_contains(&text, &["image=/twist", "has no topics"]);
 }
 
 /// `nmea_navsat_driver` and ublox write east and north instead of forward and left.
 #[test]
-fn a_receiver_s_velocity_to_east_and_north_is_no_speed_ahead() {
+fn a_receivers_velocity_in_world_axes_is_not_a_forward_speed() {
     let opened = |course: fn(u32) -> f64| {
         Drive::bare(CAMERA, |bag| {
             bag.images("/image").course_twist("/vel", 8.0, course);
@@ -127,18 +127,18 @@ fn a_receiver_s_velocity_to_east_and_north_is_no_speed_ahead() {
     let speed = receiver.frames()[12].speed_mps.unwrap();
     assert!((speed - 8.0).abs() < 1e-6, "{speed}");
     assert!(!receiver.yaw_known());
-    says(&text_of(receiver.warnings()), &["/vel", "world axes"]);
+    assert_contains(&text_of(receiver.warnings()), &["/vel", "world axes"]);
     // A vehicle that slips in bends is not mistaken for it.
     let vehicle = opened(|i| if i % 5 == 0 { 0.35 } else { 0.05 });
     let speed = vehicle.frames()[12].speed_mps.unwrap();
     assert!(speed < 7.995, "{speed}");
-    let said = text_of(vehicle.warnings());
-    assert!(!said.contains("world axes"), "{said}");
+    let warnings = text_of(vehicle.warnings());
+    assert!(!warnings.contains("world axes"), "{warnings}");
 }
 
 /// ROS 2's controllers publish commands with stamps too.
 #[test]
-fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
+fn a_command_is_used_only_for_lack_of_a_measurement() {
     let sidecar = format!("{CAMERA}[vehicle]\nwheelbase_m = 2.5\n");
     let drive = |fill: fn(&mut TinyBag)| {
         Drive::bare(&sidecar, |bag| {
@@ -154,8 +154,8 @@ fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
     });
     near(speed(&measured), 7.0);
     let opened = measured.opened();
-    let said = text_of(opened.warnings());
-    assert!(!said.contains("command"), "{said}");
+    let warnings = text_of(opened.warnings());
+    assert!(!warnings.contains("command"), "{warnings}");
     let turn = opened.track().unwrap().motion(0.2, 0.7).unwrap().yaw_rad;
     assert!(turn.abs() < 1e-6, "{turn}");
     // GPS positions are less accurate, but measured.
@@ -165,10 +165,10 @@ fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
         })),
         12.0,
     );
-    let alone = drive(|_| {});
-    near(speed(&alone), 3.0);
-    let opened = alone.opened();
-    says(
+    let commands_only = drive(|_| {});
+    near(speed(&commands_only), 3.0);
+    let opened = commands_only.opened();
+    assert_contains(
         &text_of(opened.warnings()),
         &[
             "/controller/cmd_vel: a command by its name, used as measured speed",
@@ -177,12 +177,12 @@ fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
     );
     // There is no warning if the user named the topic.
     let named = ["speed=/controller/cmd_vel", "steering=/ackermann_cmd"];
-    let named = open_with(&alone.bag, &named).unwrap();
+    let named = open_with(&commands_only.bag, &named).unwrap();
     assert!(!text_of(named.warnings()).contains("command"));
 }
 
 #[test]
-fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
+fn an_unusable_inertial_unit_can_be_left_out() {
     let level = |fill: fn(&mut TinyBag)| {
         Drive::bare(CAMERA, |bag| {
             bag.images("/image")
@@ -195,7 +195,7 @@ fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
         bag.imu_along_z("/imu/data", 0.2, 0.02);
     });
     let text = filtered.refusal();
-    says(
+    assert_contains(
         &text,
         &[
             "removed already",
@@ -223,7 +223,7 @@ fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
         bag.imu_along_z("/camera/gyro/sample", 0.2, 0.0)
             .accelerometer("/camera/accel/sample");
     });
-    says(
+    assert_contains(
         &apart.refusal(),
         &[
             "2 topics could be the imu",
@@ -232,7 +232,7 @@ fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
     );
     let named = open_with(&apart.bag, &["imu=/camera/accel/sample"]).unwrap();
     assert!((turn(&named) - 0.1).abs() < 1e-6);
-    says(
+    assert_contains(
         &text_of(named.warnings()),
         &["/camera/accel/sample: not read, since it has no angular rates"],
     );
@@ -243,14 +243,14 @@ fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
     })
     .opened();
     assert!(!still.yaw_known());
-    says(&text_of(still.warnings()), &["/imu: not read"]);
+    assert_contains(&text_of(still.warnings()), &["/imu: not read"]);
     // Images are required.
     let text = refusal(open_with(&apart.bag, &["imu=none", "image=none"]));
-    says(&text, &["no topic none", "hint: image must be one of"]);
+    assert_contains(&text, &["no topic none", "hint: image must be one of"]);
 }
 
 #[test]
-fn what_is_not_to_be_read_stays_so_in_the_file_that_is_written() {
+fn topics_set_to_none_stay_none_in_the_written_file() {
     let can = "[can]\nspeed_unit = \"km/h\"\n\
         speed = { id = 0x158, layout = { start_bit = 7, length = 16, byte_order = \"motorola\", scale = 0.01 } }\n";
     let drive = Drive::bare(&format!("{CAMERA}{can}"), |bag| {
@@ -263,7 +263,7 @@ fn what_is_not_to_be_read_stays_so_in_the_file_that_is_written() {
     };
     write_bag_config(&drive.bag, &options, true).unwrap();
     let text = std::fs::read_to_string(drive.bag.with_extension("toml")).unwrap();
-    says(&text, &["imu = \"none\"", "speed = \"none\""]);
+    assert_contains(&text, &["imu = \"none\"", "speed = \"none\""]);
     let opened = drive.opened();
     assert_eq!(opened.frames()[12].speed_mps, None);
     assert!(opened.track().is_none());
@@ -271,7 +271,7 @@ fn what_is_not_to_be_read_stays_so_in_the_file_that_is_written() {
 
 /// FAST-LIO and others leave the twist of their odometry at 0.
 #[test]
-fn an_odometry_without_a_twist_moves_as_its_poses_do() {
+fn an_odometry_without_a_twist_gives_the_motion_of_its_poses() {
     let drive = |turned_rad: f64, scale: &str| {
         Drive::bare(&format!("{CAMERA}{scale}"), |bag| {
             bag.images("/image")
@@ -287,7 +287,7 @@ fn an_odometry_without_a_twist_moves_as_its_poses_do() {
         dataset.yaw_known() && (turn - 0.2).abs() < 1e-3,
         "{turn} rad"
     );
-    says(
+    assert_contains(
         &text_of(dataset.warnings()),
         &["/Odometry: its messages have no twist: speed and turns"],
     );
@@ -297,7 +297,7 @@ fn an_odometry_without_a_twist_moves_as_its_poses_do() {
     // A body whose x axis points to the side.
     let sideways = drive(1.5, "");
     assert_eq!(sideways.frames()[12].speed_mps, None);
-    says(&text_of(sideways.warnings()), &["/Odometry: no speed"]);
+    assert_contains(&text_of(sideways.warnings()), &["/Odometry: no speed"]);
     // A vehicle at standstill is accepted.
     let standing = Drive::bare(CAMERA, |bag| {
         bag.images("/image").odometry("/odom", 0.0);
@@ -308,7 +308,7 @@ fn an_odometry_without_a_twist_moves_as_its_poses_do() {
 
 /// As with a GPX file beside a video, uncertain speeds have less weight in training.
 #[test]
-fn speeds_of_positions_say_how_sure_they_are() {
+fn speeds_from_positions_have_standard_deviations() {
     let opened = |scale: &str, positions: bool| {
         Drive::bare(&format!("{CAMERA}{scale}"), |bag| {
             bag.images("/image");

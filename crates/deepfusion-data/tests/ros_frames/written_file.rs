@@ -1,13 +1,13 @@
 //! The file beside a bag, written from what was found.
 
-use super::common::{Drive, camera, open, open_with, reference, says};
+use super::common::{Drive, assert_contains, camera, open, open_with, reference};
 use crate::common::bag::CAMERA;
 use deepfusion_data::{Dataset, Error, OpenOptions, write_bag_config};
 use nalgebra::{Matrix3, Vector3};
 use std::fs;
 
 #[test]
-fn the_file_that_is_written_says_what_was_found() {
+fn the_written_file_has_what_was_found() {
     let folder = tempfile::tempdir().unwrap();
     let bag = folder.path().join("drive.bag");
     fs::copy(reference("drive.bag"), &bag).unwrap();
@@ -15,7 +15,7 @@ fn the_file_that_is_written_says_what_was_found() {
     let written = write_bag_config(&bag, &OpenOptions::default(), false).unwrap();
     assert_eq!(written, [bag.with_extension("toml")]);
     let text = fs::read_to_string(&written[0]).unwrap();
-    says(
+    assert_contains(
         &text,
         &[
             "image = \"/camera/front/image_raw/compressed\"   # sensor_msgs/CompressedImage, 51 messages",
@@ -60,7 +60,7 @@ fn the_file_that_is_written_says_what_was_found() {
     };
     write_bag_config(&bag, &options, true).unwrap();
     let text = fs::read_to_string(&written[0]).unwrap();
-    says(
+    assert_contains(
         &text,
         &[
             "scenario = \"urban\"",
@@ -79,7 +79,7 @@ fn the_file_that_is_written_says_what_was_found() {
 }
 
 #[test]
-fn a_signal_makes_room_for_a_named_topic() {
+fn a_named_topic_replaces_a_signal() {
     let can = "[can]\nspeed_unit = \"km/h\"\n\
         speed = { id = 0x158, layout = { start_bit = 7, length = 16, byte_order = \"motorola\", scale = 0.01 } }\n";
     let drive = Drive::bare(&format!("{CAMERA}{can}"), |bag| {
@@ -112,7 +112,7 @@ fn a_signal_makes_room_for_a_named_topic() {
 }
 
 #[test]
-fn what_nobody_says_is_left_to_be_filled_in() {
+fn unknown_values_are_left_to_be_filled_in() {
     let drive = Drive::bare("", |bag| {
         bag.images("/image").twist("/speed", 10.0);
     });
@@ -122,7 +122,7 @@ fn what_nobody_says_is_left_to_be_filled_in() {
     };
     let written = write_bag_config(&drive.bag, &options, false).unwrap();
     let text = fs::read_to_string(&written[0]).unwrap();
-    says(&text, &["# [cam_from_vehicle]", "[camera]"]);
+    assert_contains(&text, &["# [cam_from_vehicle]", "[camera]"]);
     // The given camera is kept, and the commented lines are a valid transform once uncommented.
     assert_eq!(drive.opened().intrinsics(0).fx, 60.0);
     let (head, place) = text.split_once("# [cam_from_vehicle]").unwrap();

@@ -15,10 +15,10 @@ impl EpipolarPair {
     /// The camera's turn according to its points, radians about its axes, if it moved along `direction` except for a momentary pitch.
     /// `None` if they do not determine one.
     pub(crate) fn turn_of_a_pitching_body(&self, direction: &Vector3<f64>) -> Option<Vector3<f64>> {
-        let said = self.earlier_from_later.axis_angle();
+        let measured = self.earlier_from_later.axis_angle();
         let [tilt, pitch] = [USUAL_TILT, USUAL_PITCH].map(|usual| 1.0 / usual.powi(2));
         let hold = Vector4::new(tilt, 0.0, tilt, pitch);
-        let start = said.push(0.0);
+        let start = measured.push(0.0);
         let mut found = start;
         // The movement along a line is what remains without the turn, so each round depends on the one before.
         for _ in 0..2 * ROUNDS {
@@ -53,12 +53,12 @@ mod tests {
     use deepfusion_geometry::Se3;
 
     #[test]
-    fn the_turn_is_the_camera_s_whether_its_nose_is_up_or_down() {
+    fn the_turn_is_right_at_any_pitch() {
         let omega = Vector3::new(0.003, 0.02, -0.002);
-        let said = Se3::from_axis_angle(Vector3::zeros(), Vector3::z());
+        let measured = Se3::from_axis_angle(Vector3::zeros(), Vector3::z());
         for pitch in [-0.02, 0.0, 0.02] {
             let heads = turned(&Vector3::z(), Vector2::new(pitch, 0.0));
-            let pair = pair(heads, omega, said);
+            let pair = pair(heads, omega, measured);
             let turn = pair.turn_of_a_pitching_body(&Vector3::z()).unwrap();
             // A fixed heading would be off by the pitch over some 14 m: 0.0014.
             assert!((turn - omega).norm() < 5e-4, "{pitch} {turn}");

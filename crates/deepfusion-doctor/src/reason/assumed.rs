@@ -95,8 +95,11 @@ fn of_motion(warning: &MotionWarning) -> &'static str {
         MotionWarning::NoCourseRates | MotionWarning::CourseNotRead { .. } => {
             "write course.csv again, or remove it"
         }
-        MotionWarning::Bridged { .. } | MotionWarning::NotBridged { .. } => {
-            "check that the vehicle did not stop in between; if it did, set max_gap_s in dataset.toml, or under [vehicle] in the TOML file beside a bag"
+        MotionWarning::Bridged { .. } => {
+            "check that the vehicle did not stop in between; if it did, set a smaller max_gap_s in dataset.toml, or under [vehicle] in the TOML file beside a bag"
+        }
+        MotionWarning::NotBridged { .. } => {
+            "if the vehicle did not stop in between, set a greater max_gap_s in dataset.toml, or under [vehicle] in the TOML file beside a bag"
         }
         MotionWarning::SegmentWithoutTurns | MotionWarning::TurnsOfImages { .. } => {
             "record an inertial unit or the steering angle"
@@ -135,8 +138,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_file_and_its_key_are_named() {
-        let cases: [(DataWarning, &str); 7] = [
+    fn hints_name_the_file_and_its_key() {
+        let cases: [(DataWarning, &str); 9] = [
             (
                 CameraWarning::Assumed {
                     fx: 900.0,
@@ -162,6 +165,26 @@ mod tests {
                 "imu in dataset.toml",
             ),
             (
+                MotionWarning::Bridged {
+                    log: "speed.csv".into(),
+                    gaps: 1,
+                    longest_s: 1.2,
+                    setting: "max_gap_s in dataset.toml",
+                }
+                .into(),
+                "if it did, set a smaller max_gap_s",
+            ),
+            (
+                MotionWarning::NotBridged {
+                    log: "speed.csv".into(),
+                    gaps: 1,
+                    most_s: 0.5,
+                    setting: "max_gap_s in dataset.toml",
+                }
+                .into(),
+                "if the vehicle did not stop in between, set a greater max_gap_s",
+            ),
+            (
                 DataWarning::FramesElsewhere {
                     folder: "frames".into(),
                 },
@@ -170,8 +193,8 @@ mod tests {
             (DataWarning::Other("it rained".into()), "dataset.toml"),
         ];
         for (warning, named) in cases {
-            let said = hint(&warning);
-            assert!(said.contains(named), "{warning}: {said}");
+            let hint = hint(&warning);
+            assert!(hint.contains(named), "{warning}: {hint}");
         }
     }
 }

@@ -243,8 +243,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_wrong_with_its_numbers_is_said() {
-        for (reason, said) in [
+    fn intrinsics_problems_have_their_messages() {
+        for (reason, message) in [
             (
                 CameraReason::View {
                     fx: 7.2,
@@ -279,12 +279,12 @@ mod tests {
                 "cy 117.6 is far from the middle of 480 pixels: only a cropped image has it there",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 
     #[test]
-    fn where_it_heads_is_said_in_words() {
+    fn messages_name_the_direction_of_travel() {
         for (angle, off_deg, side) in [
             (HeadingAngle::Pitch, 2.04, "up"),
             (HeadingAngle::Pitch, -2.04, "down"),
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn by_how_much_to_correct_is_said() {
+    fn hints_name_the_correction() {
         let heading = |angle, centre_by_px| CameraReason::Heading {
             angle,
             off_deg: 2.04,
@@ -349,17 +349,17 @@ mod tests {
     }
 
     #[test]
-    fn what_measured_depth_says_of_the_mounts() {
+    fn mount_problems_have_their_messages() {
         let turned = |angle| CameraReason::RoadTurned {
             frames: 8,
             camera_by_deg: 3.04,
             angle,
         };
         for (angle, name) in [(RoadAngle::Pitch, "pitch"), (RoadAngle::Roll, "roll")] {
-            let said = format!(
+            let message = format!(
                 "the road in the measured depth of 8 frames is turned by 3.0 degrees ({name}) against what the mounts say"
             );
-            assert_eq!(turned(angle).to_string(), said);
+            assert_eq!(turned(angle).to_string(), message);
         }
         assert_eq!(
             CameraReason::Height { height_m: 0.33 }.to_string(),

@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_wrong_with_times_is_said() {
+    fn timing_problems_have_their_messages() {
         let lost = |lost| FramesReason::Lost {
             lost,
             rate_hz: 10.04,
@@ -129,7 +129,7 @@ mod tests {
             stretches,
             first: 40,
         };
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 FramesReason::Backwards { by_s: 0.1 },
                 "its time stamp is 0.100 s earlier than that of the frame before",
@@ -169,7 +169,7 @@ mod tests {
                  these frames can train",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 
@@ -180,7 +180,7 @@ mod tests {
             frames: 9,
             first: 5,
         };
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 repeated(1),
                 "1 of 9 frames repeats the frame before while the vehicle moves, the first of them frame 5: training on it teaches that everything is infinitely far",
@@ -199,7 +199,7 @@ mod tests {
                 "the vehicle stands in 30 of 99 pairs, longest in frames 10 to 25: they show no parallax and are left out of training",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

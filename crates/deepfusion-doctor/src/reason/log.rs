@@ -158,12 +158,12 @@ mod tests {
     use deepfusion_logs::TableNote;
 
     #[test]
-    fn what_a_log_holds_is_said_with_its_notes() {
+    fn the_contents_of_a_log_are_printed_with_its_notes() {
         let notes: Vec<LogNote> = vec![
             TableNote::HeaderAgain { more: 1 }.into(),
             TableNote::HeaderAgain { more: 2 }.into(),
         ];
-        let said = [notes[0].to_string(), notes[1].to_string()].join("; ");
+        let message = [notes[0].to_string(), notes[1].to_string()].join("; ");
         let holds = LogReason::Holds {
             log: "drive.csv".into(),
             format: Format::Table,
@@ -173,7 +173,7 @@ mod tests {
         };
         assert_eq!(
             holds.to_string(),
-            format!("table with 13 speeds and 1 yaw rate: {said}")
+            format!("table with 13 speeds and 1 yaw rate: {message}")
         );
         assert_eq!(
             holds.hint(),
@@ -182,8 +182,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_log_is_said() {
-        for (reason, said) in [
+    fn log_problems_have_their_messages() {
+        for (reason, message) in [
             (
                 LogReason::NoSpeed(NoGps::NoFix),
                 "the camera's own log has no speed: the camera's GPS never had a fix",
@@ -227,7 +227,7 @@ mod tests {
                 "the times are not dates: when the video began is unknown, unless the log began with it",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

@@ -196,13 +196,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_contradicts_the_speeds_is_said() {
+    fn speed_problems_have_their_messages() {
         let road = SpeedWarning {
             implied_height_m: 6.0,
             pairs: 12,
         };
         assert_eq!(MotionReason::Road(road).to_string(), road.to_string());
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 MotionReason::Unchecked { fastest_mps: 50.04 },
                 "neither road nor poses show whether the speeds are right: according to them, the vehicle drives at up to 50.0 m/s (180 km/h)",
@@ -238,13 +238,13 @@ mod tests {
                 "of 400 points that are dynamic according to their radial velocity, the topic of dynamic points contains 12",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 
     #[test]
-    fn directions_are_said_in_words() {
-        for (reason, said) in [
+    fn messages_name_the_direction() {
+        for (reason, message) in [
             (
                 MotionReason::LidarSideways { left_deg: 3.96 },
                 "according to its radial velocities, the LiDAR moves 4.0 degrees to the left of the direction that its mount gives",
@@ -262,18 +262,18 @@ mod tests {
                 "according to its radial velocities, the LiDAR moves 4.0 degrees below the direction that its mount gives",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 
     #[test]
-    fn what_is_wrong_with_turns_and_clock_is_said() {
+    fn turn_and_clock_problems_have_their_messages() {
         let offset = |vehicle_minus_camera_s| MotionReason::ClockOffset {
             vehicle_minus_camera_s,
             std_error_s: 0.0041,
             camera_ahead_s: -vehicle_minus_camera_s,
         };
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 MotionReason::Steering {
                     turning_s: 12.3,
@@ -299,12 +299,12 @@ mod tests {
                  another unit), and depths would be wrong by as much",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 
     #[test]
-    fn what_to_multiply_by_is_said() {
+    fn hints_name_the_factor_or_offset() {
         let road = |implied_height_m| {
             let pairs = 12;
             MotionReason::Road(SpeedWarning {

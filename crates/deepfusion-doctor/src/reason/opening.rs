@@ -69,7 +69,7 @@ mod tests {
     #[test]
     fn a_drive_without_pairs_is_left_out_or_fails() {
         let error = Error::file(Path::new("drive"), ErrorKind::NotFound.into());
-        let said = error.to_string();
+        let message = error.to_string();
         let problem = SharedError::from(error);
         for (left_out, what) in [
             (true, "training leaves this drive out"),
@@ -77,20 +77,20 @@ mod tests {
         ] {
             let problem = problem.clone();
             let reason = OpeningReason::NoPair { left_out, problem };
-            assert_eq!(reason.to_string(), format!("{what}: {said}"));
+            assert_eq!(reason.to_string(), format!("{what}: {message}"));
         }
-        assert_eq!(OpeningReason::Image(problem.clone()).to_string(), said);
-        assert_eq!(OpeningReason::Recording(problem).to_string(), said);
+        assert_eq!(OpeningReason::Image(problem.clone()).to_string(), message);
+        assert_eq!(OpeningReason::Recording(problem).to_string(), message);
     }
 
     #[test]
-    fn what_is_taken_for_granted_is_said() {
+    fn assumptions_have_their_messages() {
         assert_eq!(
             OpeningReason::NoTurns.to_string(),
             "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked; training takes the turns from the images"
         );
         let warning = DataWarning::from(CameraWarning::LensCorrected);
-        let said = warning.to_string();
-        assert_eq!(OpeningReason::from(warning).to_string(), said);
+        let message = warning.to_string();
+        assert_eq!(OpeningReason::from(warning).to_string(), message);
     }
 }

@@ -141,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn how_pictures_look_is_said() {
+    fn picture_problems_have_their_messages() {
         let jumps = |jumps, first_ratio| PicturesReason::BrightnessJumps {
             jumps,
             neighbours: 99,
@@ -160,7 +160,7 @@ mod tests {
             share: 0.993,
             across: 96,
         };
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 PicturesReason::LittleParallax,
                 "the picture hardly moves from frame to frame: the parallax is below the images' noise",
@@ -200,12 +200,12 @@ mod tests {
                 "14 pixels at the left do not change while the vehicle moves (over 99 % of that side): training on them teaches that this part of the vehicle is infinitely far",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 
     #[test]
-    fn what_to_cut_off_is_said() {
+    fn hints_name_the_rows_and_columns_to_keep() {
         let rim = |side, across| PicturesReason::StillRim {
             side,
             pixels: 12,

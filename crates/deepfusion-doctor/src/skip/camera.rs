@@ -15,7 +15,7 @@ pub enum CameraSkip {
     #[error("too uncertain: {}", together(.0))]
     Unsure(Vec<UnsureHeading>),
     /// The camera's mount is unknown.
-    #[error("the camera's mount is unknown")]
+    #[error("the camera's mount on the vehicle is unknown")]
     NoMount,
     /// Too little of the road was measured.
     #[error(
@@ -98,13 +98,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn why_the_camera_is_not_judged_is_said() {
+    fn skip_reasons_have_their_messages() {
         let unsure = |angle| UnsureHeading {
             angle,
             off_deg: -0.44,
             std_error_deg: 0.71,
         };
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 CameraSkip::Heading(NoHeading {
                     straight: 1,
@@ -116,7 +116,10 @@ mod tests {
                 CameraSkip::Unsure([HeadingAngle::Pitch, HeadingAngle::Yaw].map(unsure).into()),
                 "too uncertain: pitch of the direction of travel -0.4 ± 0.7 degrees, yaw of the direction of travel -0.4 ± 0.7 degrees",
             ),
-            (CameraSkip::NoMount, "the camera's mount is unknown"),
+            (
+                CameraSkip::NoMount,
+                "the camera's mount on the vehicle is unknown",
+            ),
             (
                 CameraSkip::LittleRoad {
                     frames: 3,
@@ -136,7 +139,7 @@ mod tests {
                 "too few points are seen by both cameras",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

@@ -32,9 +32,9 @@ mod tests {
 
     /// The messages leave out the drive's name, which is printed beside them.
     #[test]
-    fn why_the_clocks_are_not_compared_is_said() {
+    fn skip_reasons_have_their_messages() {
         let drive = "monday".to_owned();
-        for (reason, said) in [
+        for (reason, message) in [
             (
                 ClockSkip::ByCourse(NoCameraAhead::NoSpeeds { drive }),
                 "the clocks cannot be compared: there are no speeds, or the frames have no times",
@@ -51,7 +51,7 @@ mod tests {
                 "the estimate of 0.30 s has a standard error of 0.12 s",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

@@ -23,8 +23,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_frames_lack_is_said() {
-        for (reason, said) in [
+    fn skip_reasons_have_their_messages() {
+        for (reason, message) in [
             (
                 FramesSkip::NoneInMotion,
                 "no neighbouring frames while the vehicle moves",
@@ -35,7 +35,7 @@ mod tests {
                 "no pair of neighbouring frames has a known motion",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

@@ -17,7 +17,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_log_lacks_is_said() {
+    fn skip_reasons_have_their_messages() {
         assert_eq!(
             LogSkip::NoDeviation.to_string(),
             "the log does not give the uncertainty of its speeds"

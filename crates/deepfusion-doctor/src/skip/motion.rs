@@ -71,8 +71,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_motion_lacks_is_said() {
-        for (reason, said) in [
+    fn skip_reasons_have_their_messages() {
+        for (reason, message) in [
             (
                 MotionSkip::NoRoad,
                 "no visible road (too dark, too plain, or unknown turns), and no poses",
@@ -124,7 +124,7 @@ mod tests {
                 "the vehicle hardly turns (yaw rate ±0.004 rad/s, expected at least 0.015)",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

@@ -26,8 +26,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_pictures_lack_is_said() {
-        for (reason, said) in [
+    fn skip_reasons_have_their_messages() {
+        for (reason, message) in [
             (PicturesSkip::NoImage, "no image can be read"),
             (
                 PicturesSkip::FewInMotion { needed: 12 },
@@ -38,7 +38,7 @@ mod tests {
                 "no moving pair with points to follow and a yaw rate",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), message);
         }
     }
 }

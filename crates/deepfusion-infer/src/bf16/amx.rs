@@ -97,7 +97,7 @@ impl ConvForm<Bf16> for Amx {
         &self.geometry
     }
 
-    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+    fn reads_beyond_inputs(&self) -> Option<(&Geometry, &Runs)> {
         let own = (&self.geometry, &self.runs);
         self.runs.read_on().then_some(own)
     }
@@ -336,7 +336,7 @@ impl Product<'_> {
     #[inline(always)]
     unsafe fn two_by_one(&self, sums: &mut [f32]) {
         let rows = self.checked(1, sums);
-        // SAFETY: as there.
+        // SAFETY: as in [`Self::two_by_two`].
         unsafe {
             asm!(
                 "test {left}, {left}",

@@ -67,7 +67,7 @@ impl ConvForm<Bf16> for Dot {
         &self.geometry
     }
 
-    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+    fn reads_beyond_inputs(&self) -> Option<(&Geometry, &Runs)> {
         let own = (&self.geometry, &self.runs);
         self.runs.read_on().then_some(own)
     }

@@ -36,8 +36,8 @@ const AREA: usize = IN * IN;
 const LEAST_CHANNELS: usize = 32;
 /// Minimum number of pixels: they share the transformed weights, which are nearly twice as large.
 const LEAST_PIXELS: usize = 400;
-/// Maximum number of bytes of transformed inputs and products of a task, so that they stay in the L2 cache. If the weights are too large
-/// for that cache, they may take half as many bytes as the weights, since each task reads all weights.
+/// Maximum number of bytes of transformed inputs and products of a task, so that they stay in the L2 cache. If the weights are too large for
+/// that cache, a task may take half as many bytes as the weights, since each task reads all weights.
 const BYTES_AT_ONCE: usize = 600_000;
 
 /// A convolution ready to run.

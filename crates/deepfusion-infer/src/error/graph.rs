@@ -75,7 +75,7 @@ pub enum GraphProblem {
         epsilon: f32,
     },
     /// A number of channels that is not divisible into queries, keys and values of the heads.
-    #[error("{} for 3 times {}", count_of(*channels, "channel"), count_of(*heads, "head"))]
+    #[error("{} of input, expected a multiple of 3 × {heads} (queries, keys and values of {})", count_of(*channels, "channel"), count_of(*heads, "head"))]
     Heads {
         /// Number of channels of the input.
         channels: usize,
@@ -89,7 +89,7 @@ pub enum GraphProblem {
         per_axis: usize,
     },
     /// A number of channels that is not divisible by the four pixels of a block.
-    #[error("{} for 2×2 pixels", count_of(*channels, "channel"))]
+    #[error("{} of input, expected a multiple of 4 (2×2 pixels)", count_of(*channels, "channel"))]
     ChannelsForPixels {
         /// Number of channels of the input.
         channels: usize,
@@ -127,7 +127,9 @@ pub enum Misfit {
         input: ValueShape,
     },
     /// The operand for every pixel is not a single pixel, or has other channels.
-    #[error("{pixel:?} at every pixel of {input:?}, expected a single pixel of as many channels")]
+    #[error(
+        "{pixel:?} at every pixel of {input:?}, expected a single pixel with the same number of channels"
+    )]
     Pixel {
         /// Shape of the operand for every pixel.
         pixel: ValueShape,

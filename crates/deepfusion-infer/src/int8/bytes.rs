@@ -163,7 +163,7 @@ mod tests {
     use crate::element::Element;
 
     #[test]
-    fn zero_is_a_byte_whatever_the_range() {
+    fn zero_has_an_exact_byte_in_every_range() {
         for range in [[-1.0, 3.0], [0.5, 2.0], [-4.0, -1.0], [0.0, 0.0]] {
             let scale = Scale::of(range);
             assert!(scale.step > 0.0, "{range:?}");
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn values_are_rounded_and_held_within_a_byte() {
+    fn values_are_rounded_and_limited_to_a_byte() {
         if !super::super::has_int8() {
             return;
         }

@@ -70,10 +70,10 @@ impl ConvForm<Bf16> for Int8Conv {
     }
 
     /// Int8 reads its inputs only.
-    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+    fn reads_beyond_inputs(&self) -> Option<(&Geometry, &Runs)> {
         match self {
             Self::Bytes(_) => None,
-            Self::Bf16(conv) => conv.reads_on(),
+            Self::Bf16(conv) => conv.reads_beyond_inputs(),
         }
     }
 

@@ -154,7 +154,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]
-    fn skip_paths_compute_what_the_operations_mean(
+    fn skip_paths_equal_the_definition(
         seed in any::<u64>(),
         widths in [1_usize..40, 1_usize..70, 1_usize..80],
         // Some dilations exceed the image: those taps read only padding.
@@ -170,7 +170,7 @@ proptest! {
 
 /// At least 1,024 pixels at a quarter of the size, so that dilated kernels use Winograd's form, phase by phase.
 #[test]
-fn large_dilated_convolutions_take_the_winograd_form_and_agree_too() {
+fn large_dilated_convolutions_use_winograds_form_and_equal_the_definition() {
     let parts = SkipPath {
         widths: [16, 32, 48],
         rates: vec![2, 3, 6],

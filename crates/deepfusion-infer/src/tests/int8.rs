@@ -95,7 +95,7 @@ fn by_integers(graph: &Graph, input: &[f32], [low, high]: [f32; 2]) -> Vec<f32> 
 }
 
 #[test]
-fn sums_are_those_of_the_integers() {
+fn sums_equal_integer_arithmetic() {
     if !Engine::has_int8() {
         return;
     }
@@ -143,7 +143,7 @@ fn sums_are_those_of_the_integers() {
 }
 
 #[test]
-fn a_network_in_int8_is_near_its_definition_and_takes_the_form() {
+fn a_network_in_int8_is_near_its_definition_and_uses_int8() {
     if !Engine::has_int8() {
         return;
     }
@@ -177,7 +177,7 @@ fn a_network_in_int8_is_near_its_definition_and_takes_the_form() {
 }
 
 #[test]
-fn int8_without_ranges_or_with_another_networks_is_refused() {
+fn int8_without_ranges_or_with_those_of_another_network_is_refused() {
     if !Engine::has_int8() {
         return;
     }

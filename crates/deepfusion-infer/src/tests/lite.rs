@@ -152,7 +152,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn they_compute_what_they_mean(
+    fn operations_equal_their_definitions(
         seed in any::<u64>(),
         (heads, each, expansion) in (1_usize..5, 1_usize..40, 1_usize..4),
         kernel in prop::sample::select(vec![1_usize, 3, 5]),
@@ -227,7 +227,10 @@ fn operations_that_do_not_fit_are_refused() {
         input: full,
         temperature: vec![1.0; heads],
     };
-    refused(attention(3), "12 channels for 3 times 3 heads");
+    refused(
+        attention(3),
+        "12 channels of input, expected a multiple of 3 × 3 ",
+    );
     refused(attention(0), "heads");
     let position = |per_axis, halvings| Op::Position { per_axis, halvings };
     refused(position(0, 1), "channels per axis");

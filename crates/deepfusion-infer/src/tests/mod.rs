@@ -79,7 +79,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn the_engine_computes_what_the_operations_mean(
+    fn the_engine_equals_the_definition(
         seed in any::<u64>(),
         widths in [1_usize..40, 1_usize..70, 1_usize..150, 1_usize..40],
         bottleneck in any::<bool>(),
@@ -127,7 +127,7 @@ proptest! {
 }
 
 #[test]
-fn large_images_take_the_winograd_form_and_agree_too() {
+fn large_images_use_winograds_form_and_equal_the_definition() {
     let graph = network(7, [16, 64, 96, 32], true, 7);
     let (width, height) = (208, 72);
     let image = noise_image(3, width, height);
@@ -194,8 +194,8 @@ impl ConvForm<crate::element::Bf16> for WithoutMatrixUnit {
         self.0.geometry()
     }
 
-    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
-        self.0.reads_on()
+    fn reads_beyond_inputs(&self) -> Option<(&Geometry, &Runs)> {
+        self.0.reads_beyond_inputs()
     }
 
     unsafe fn run(&self, arena: Shared<crate::element::Bf16>) {
@@ -340,7 +340,7 @@ fn graphs_of_any_shape_are_laid_out_right_and_images_do_not_mix() {
 }
 
 #[test]
-fn what_cannot_be_laid_out_is_refused() {
+fn graphs_that_cannot_be_laid_out_are_refused() {
     let mut graph = Graph::new([0.4; 3], [0.3; 3]);
     let conv = Conv {
         input: ValueId::IMAGE,
@@ -379,7 +379,7 @@ fn what_cannot_be_laid_out_is_refused() {
 }
 
 #[test]
-fn images_for_which_no_memory_is_large_enough_are_refused() {
+fn images_too_large_for_memory_are_refused() {
     for side in [1 << 29, 1 << 33, 1 << 62] {
         let graph = network(7, [8, 8, 8, 8], true, 7);
         let error = Engine::new(graph, side, side, Precision::F32).unwrap_err();

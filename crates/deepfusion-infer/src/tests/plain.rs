@@ -53,7 +53,7 @@ impl<const MULTIPLE: usize> ConvForm<Bf16> for Plain<MULTIPLE> {
         &self.geometry
     }
 
-    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+    fn reads_beyond_inputs(&self) -> Option<(&Geometry, &Runs)> {
         Some((&self.geometry, &self.runs))
     }
 

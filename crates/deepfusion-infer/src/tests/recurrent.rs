@@ -81,7 +81,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn they_compute_what_they_mean(
+    fn operations_equal_their_definitions(
         seed in any::<u64>(),
         channels in 1_usize..40,
         halvings in 1_u32..4,

@@ -124,7 +124,7 @@ fn nothing_stale_is_read_in_bf16() {
 
 /// The bf16 forms in plain code give the network's values, up to rounding.
 #[test]
-fn what_bf16_reads_is_what_the_operations_mean() {
+fn bf16_in_plain_code_equals_the_definition() {
     for (i, (graph, width, height)) in graphs().into_iter().enumerate() {
         let size = (width, height);
         let values = run(&graph, &noise_image(8, width, height), height, width);
@@ -138,7 +138,7 @@ fn what_bf16_reads_is_what_the_operations_mean() {
 }
 
 #[test]
-fn a_finite_image_that_overflows_is_not_seen_in_the_next() {
+fn an_image_that_overflows_does_not_affect_the_next() {
     let (graph, width, height) = (widening_network(), 12, 8);
     let image = noise_image(8, width, height);
     for precision in [Precision::F32, Precision::Bf16] {

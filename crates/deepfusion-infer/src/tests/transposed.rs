@@ -47,7 +47,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn they_compute_what_they_mean(
+    fn operations_equal_their_definitions(
         seed in any::<u64>(),
         widths in [1_usize..24, 1_usize..40, 1_usize..40, 1_usize..40],
         kernel in prop::sample::select(vec![3_usize, 5, 7]),
@@ -81,7 +81,7 @@ proptest! {
 
 /// Enlargements that double the size exactly need exact halvings; the rest of the network does not.
 #[test]
-fn sizes_may_round_up_where_they_are_cut() {
+fn sizes_may_round_up_where_they_are_cropped() {
     let graph = small_network();
     assert!(graph.check_size(34, 22).is_ok());
     let error = graph.check_size(34, 21).unwrap_err().to_string();
@@ -89,7 +89,7 @@ fn sizes_may_round_up_where_they_are_cut() {
 }
 
 #[test]
-fn channels_that_make_no_pixels_are_refused() {
+fn channels_that_do_not_divide_into_pixels_are_refused() {
     let mut b = Builder {
         graph: Graph::new([0.4; 3], [0.3; 3]),
         noise: noise(1),
@@ -100,7 +100,7 @@ fn channels_that_make_no_pixels_are_refused() {
         let error = b.graph.clone().push("op", op).unwrap_err().to_string();
         assert!(error.contains(why), "{error}");
     };
-    refused(half, "6 channels for 2×2 pixels");
+    refused(half, "6 channels of input, expected a multiple of 4");
     refused(ValueId::IMAGE, "3 channels");
     let full = b.conv(ValueId::IMAGE, 8, |_| ());
     let error = b.graph.push("op", Op::DepthToSpace { input: full });

@@ -57,7 +57,7 @@ pub fn conv2d(
     }
     let out = room(out);
     let sum = winograd_sum(shape, x, weight, bias);
-    if shape.is_plain_3x3() && sum.pays() {
+    if shape.is_plain_3x3() && sum.is_faster() {
         return by_winograd(shape, &sum, out);
     }
     let out = SharedMut::new(out);

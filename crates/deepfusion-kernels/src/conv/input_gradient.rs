@@ -47,7 +47,7 @@ pub fn conv2d_backward_input(
         return;
     }
     let sum = winograd_sum(shape, weight, grad_out);
-    if shape.is_plain_3x3() && sum.pays() {
+    if shape.is_plain_3x3() && sum.is_faster() {
         return by_winograd(shape, &sum, grad_x);
     }
     // Without reflection, every value is written exactly once.

@@ -134,20 +134,30 @@ fn all_passes(s: &ConvShape) -> [Vec<f32>; 4] {
 fn check(s: &ConvShape) {
     let [x, w, b, g] = inputs(s);
     let exact = Exact::of(s);
-    let form = |pays: bool| {
-        if s.is_plain_3x3() && pays {
+    let form = |is_faster: bool| {
+        if s.is_plain_3x3() && is_faster {
             Form::Winograd
         } else {
             Form::Plain
         }
     };
     let [y, gx, gw, gb] = all_passes(s);
-    let pays = forward::winograd_sum(s, &x, &w, Some(&b)).pays();
-    assert_close(&y, &exact.output, form(pays), "output");
-    let pays = input_gradient::winograd_sum(s, &w, &g).pays();
-    assert_close(&gx, &exact.input_gradient, form(pays), "input gradient");
-    let pays = weight_gradient::winograd(s, &x, &g).pays();
-    assert_close(&gw, &exact.weight_gradient, form(pays), "weight gradient");
+    let is_faster = forward::winograd_sum(s, &x, &w, Some(&b)).is_faster();
+    assert_close(&y, &exact.output, form(is_faster), "output");
+    let is_faster = input_gradient::winograd_sum(s, &w, &g).is_faster();
+    assert_close(
+        &gx,
+        &exact.input_gradient,
+        form(is_faster),
+        "input gradient",
+    );
+    let is_faster = weight_gradient::winograd(s, &x, &g).is_faster();
+    assert_close(
+        &gw,
+        &exact.weight_gradient,
+        form(is_faster),
+        "weight gradient",
+    );
     assert_close(&gb, &exact.bias_gradient, Form::Plain, "bias gradient");
 }
 

@@ -62,7 +62,7 @@ pub fn conv2d_backward_weight(
         return;
     }
     let winograd = winograd(shape, x, grad_out);
-    if shape.is_plain_3x3() && winograd.pays() {
+    if shape.is_plain_3x3() && winograd.is_faster() {
         let many = shape.weight_len() > FEW_WEIGHTS && shape.in_channels >= TASKS;
         return by_winograd(shape, &winograd, many, grad_weight);
     }

@@ -27,8 +27,8 @@ impl Builder {
         let mut logit = self.everywhere("r_msfm.start", state, start)?;
         for index in 0..r_msfm.iterations {
             if index > 0 {
-                let seen = match r_msfm.taken_up(index) {
-                    RefinementInput::Again(level) => self.feature_again(level, state)?,
+                let seen = match r_msfm.refinement_input(index) {
+                    RefinementInput::Again(level) => self.second_input(level, state)?,
                     RefinementInput::Middle => self.feature("middle", f1, R_MSFM_STATE, 2)?,
                     RefinementInput::Fine => self.fine(f0)?,
                 };
@@ -74,8 +74,8 @@ impl Builder {
         self.feature("fine", small, R_MSFM_STATE, 2)
     }
 
-    /// The convolutions 1×3 and 3×1, with tanh after each, through which R-MSFM6 reads a feature a second time.
-    fn feature_again(&mut self, index: usize, input: ValueId) -> Result<ValueId, NetworkError> {
+    /// The input of R-MSFM6's second refinement at a level, from the state: convolutions of 1×3 and 3×1, with tanh after each.
+    fn second_input(&mut self, index: usize, input: ValueId) -> Result<ValueId, NetworkError> {
         let mut x = input;
         for strip in ["across", "down"] {
             let path = format!("r_msfm.features.context.{index}.{strip}");

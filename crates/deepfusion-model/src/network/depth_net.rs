@@ -246,7 +246,7 @@ impl DepthNetConfig {
             ("aggregation", !self.aggregation),
             ("decoder", self.decoder == DecoderConfig::default()),
         ];
-        match others.into_iter().find(|(_, as_it_was)| !as_it_was) {
+        match others.into_iter().find(|(_, is_default)| !is_default) {
             None => Ok(()),
             Some((field, _)) => Err(NetworkError::config(
                 field,

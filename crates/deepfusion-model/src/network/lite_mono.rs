@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn what_means_no_network_is_refused_by_field() {
+    fn invalid_settings_are_refused_by_field() {
         let field = |change: fn(&mut LiteMonoConfig)| {
             let mut config = LiteMonoConfig::new(LiteMonoSize::Full);
             change(&mut config);

@@ -48,10 +48,10 @@ impl RMsfmConfig {
         self.iterations == 6
     }
 
-    /// Input of the state's update before refinement `index`, counted from 1: features from coarse to fine, each once or twice. Refinement
-    /// 0 starts with the coarsest feature as its state.
+    /// Input of the state's update before refinement `index`, which must be at least 1: features from coarse to fine, each once or twice.
+    /// Refinement 0 starts with the coarsest feature as its state.
     #[must_use]
-    pub fn taken_up(&self, index: usize) -> RefinementInput {
+    pub fn refinement_input(&self, index: usize) -> RefinementInput {
         let times = if self.twice() { 2 } else { 1 };
         match (index % times, index / times) {
             (1, level) => RefinementInput::Again(level),
@@ -71,11 +71,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn features_are_taken_up_from_coarse_to_fine() {
+    fn features_are_read_from_coarse_to_fine() {
         use RefinementInput::{Again, Fine, Middle};
         let all = |iterations: usize| -> Vec<RefinementInput> {
             let config = RMsfmConfig { iterations };
-            (1..iterations).map(|i| config.taken_up(i)).collect()
+            (1..iterations)
+                .map(|i| config.refinement_input(i))
+                .collect()
         };
         assert_eq!(all(3), [Middle, Fine]);
         assert_eq!(all(6), [Again(0), Middle, Again(1), Fine, Again(2)]);

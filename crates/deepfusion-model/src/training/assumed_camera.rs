@@ -38,7 +38,7 @@ impl Default for AssumedCamera {
 impl AssumedCamera {
     /// The fixed assumed camera that is as wide as a learned one.
     #[must_use]
-    pub fn held(k: &Intrinsics) -> Self {
+    pub fn fixed(k: &Intrinsics) -> Self {
         let half = f64::from(k.width.max(k.height)) / 2.0 / k.fx;
         Self {
             hfov_deg: 2.0 * half.atan().to_degrees(),
@@ -146,7 +146,7 @@ mod tests {
     use crate::Preset;
 
     #[test]
-    fn a_learned_camera_can_be_held() {
+    fn a_learned_camera_can_be_fixed() {
         let camera = Intrinsics {
             fx: 400.0,
             fy: 420.0,
@@ -155,16 +155,16 @@ mod tests {
             width: 640,
             height: 192,
         };
-        let held = AssumedCamera::held(&camera);
-        assert!(!held.learn);
-        let again = held.intrinsics();
+        let fixed = AssumedCamera::fixed(&camera);
+        assert!(!fixed.learn);
+        let again = fixed.intrinsics();
         let scale = 640.0 / f64::from(again.width);
         assert!((again.fx * scale - 400.0).abs() < 1e-9, "{again:?}");
         assert!((again.fy * scale - 420.0).abs() < 1e-9, "{again:?}");
     }
 
     #[test]
-    fn what_is_learned_stays_a_camera() {
+    fn the_limits_of_a_learned_camera_are_valid_cameras() {
         for hfov_deg in [5.0, 60.0, 165.0] {
             let camera = AssumedCamera {
                 hfov_deg,
@@ -178,7 +178,7 @@ mod tests {
                     fx: k.fx * ratio,
                     ..k
                 };
-                let view = AssumedCamera::held(&learned).hfov_deg;
+                let view = AssumedCamera::fixed(&learned).hfov_deg;
                 let (from, to) = (hfov_deg.min(10.0), hfov_deg.max(160.0));
                 assert!((from - 1e-9..=to + 1e-9).contains(&view), "{view}");
             }
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_camera_is_refused() {
+    fn invalid_cameras_are_refused() {
         let mut config = Preset::Tiny.config();
         assert!(!config.to_toml().unwrap().contains("assumed_camera"));
         config.set("assumed_camera.hfov_deg=75").unwrap();

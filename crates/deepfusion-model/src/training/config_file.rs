@@ -122,7 +122,7 @@ mod tests {
 
     /// The paper's preset has a context encoding; a whole file that leaves it out configures a network without it.
     #[test]
-    fn a_whole_file_stands_for_itself() {
+    fn a_whole_file_ignores_its_preset() {
         let mut config = Preset::Paper.config();
         config.depth_net.hce = None;
         assert_eq!(read(&config.to_toml().unwrap()).unwrap(), config);
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn errors_name_the_file_and_the_key() {
         for (text, expected) in [
             ("preset = \"light\"\nbatsch = 7\n", "batsch"),
             (
@@ -154,8 +154,8 @@ mod tests {
     }
 
     #[test]
-    fn a_key_that_is_misspelt_is_named_with_what_was_meant() {
-        let said = |assignment: &str| {
+    fn a_misspelt_key_is_named_with_a_suggestion() {
+        let message = |assignment: &str| {
             let mut config = Preset::Light.config();
             config.set(assignment).unwrap_err().to_string()
         };
@@ -170,14 +170,14 @@ mod tests {
             ),
             ("hope=1", "hope=1: unknown key `hope`"),
         ] {
-            assert_eq!(said(assignment), expected);
+            assert_eq!(message(assignment), expected);
         }
         // The key exists, but the value is invalid.
-        assert!(!said("batch=many").contains("unknown key"));
+        assert!(!message("batch=many").contains("unknown key"));
     }
 
     #[test]
-    fn keys_are_set_one_by_one() {
+    fn single_keys_can_be_set() {
         let mut config = Preset::Light.config();
         for assignment in [
             "batch=3",
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn elements_of_lists_are_set_one_by_one() {
+    fn single_elements_of_lists_can_be_set() {
         let mut config = Preset::Light.config();
         for assignment in [
             "frames=[-1, 1]",

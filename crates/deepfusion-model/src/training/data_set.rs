@@ -243,7 +243,7 @@ impl TrainConfig {
 
     /// The data set of the given name. Without a name: the only set; or, if all sets share one depth range, the only set whose motion is
     /// learned, since a depth means the same metres in all of them.
-    pub(crate) fn set_meant(&self, name: Option<&str>) -> Option<&DataSetConfig> {
+    pub(crate) fn selected_set(&self, name: Option<&str>) -> Option<&DataSetConfig> {
         let sets = self.data.sets.as_slice();
         if let Some(name) = name {
             return sets.iter().find(|s| s.name == name);
@@ -270,7 +270,7 @@ impl TrainConfig {
         if self.data.sets.is_empty() && name.is_none() {
             return Ok(self);
         }
-        let Some(set) = self.set_meant(name).cloned() else {
+        let Some(set) = self.selected_set(name).cloned() else {
             let mut names: Vec<String> = self.data.sets.iter().map(|s| s.name.clone()).collect();
             let expected = match names.len() {
                 0 => ExpectedDataSet::NoSets,
@@ -380,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn a_set_brings_its_own_metres() {
+    fn a_set_has_its_own_metres() {
         let config = config();
         config.validate().unwrap();
         assert_eq!(config.factors(0).0, config.depth_net.range);
@@ -399,7 +399,7 @@ mod tests {
 
     /// Recorded drives beside simulated depth of the same range: no name is needed to decide which metres are meant.
     #[test]
-    fn of_sets_with_one_range_the_one_that_moves_is_meant() {
+    fn with_one_depth_range_the_default_set_is_the_one_that_learns_motion() {
         let mut config = config();
         config.data.sets[1].range = None;
         assert!(config.clone().for_set(None).is_err(), "both learn motion");
@@ -414,7 +414,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_without_sets_are_as_before() {
+    fn runs_without_sets_use_the_networks_factors() {
         let mut config = Preset::Tiny.config();
         config.pose_net.metres_per_unit = 0.7;
         assert!(!config.to_toml().unwrap().contains("sets"));
@@ -424,7 +424,7 @@ mod tests {
     }
 
     #[test]
-    fn simulated_views_are_chosen_in_a_line() {
+    fn simulated_views_are_configured_in_one_line() {
         let text = r#"
             [[sets]]
             name = "streets"
@@ -457,7 +457,7 @@ mod tests {
     }
 
     #[test]
-    fn simulated_views_are_seen_by_ones_own_camera() {
+    fn simulated_views_can_have_the_users_camera() {
         let text = r#"
             [[sets]]
             name = "streets"
@@ -476,7 +476,7 @@ mod tests {
     }
 
     #[test]
-    fn sets_that_mean_nothing_are_refused() {
+    fn invalid_sets_are_refused() {
         type Change = fn(&mut TrainConfig);
         let cases: [(&str, Change); 8] = [
             ("data.sets.name", |c| c.data.sets[1].name = "road".into()),

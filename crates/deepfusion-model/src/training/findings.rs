@@ -112,8 +112,8 @@ impl TrainFindings {
     /// The camera that a data set was trained with; `set` as for [`TrainConfig::for_set`].
     #[must_use]
     pub fn camera_of(&self, config: &TrainConfig, set: Option<&str>) -> Option<Intrinsics> {
-        let meant = config.set_meant(set);
-        let own = meant.and_then(|meant| self.set(&meant.name));
+        let selected = config.selected_set(set);
+        let own = selected.and_then(|selected| self.set(&selected.name));
         own.and_then(|own| own.camera).or(self.camera)
     }
 
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn a_runs_file_holds_both_and_keeps_them_apart() {
+    fn a_runs_file_keeps_settings_and_findings_apart() {
         let (config, findings) = (config(), findings());
         let text = config.to_toml().unwrap() + &findings.to_toml().unwrap();
         assert!(text.contains("\n[findings]\n"), "{text}");
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_open_is_filled_in_and_what_is_set_stays() {
+    fn open_values_are_filled_in_and_set_values_stay() {
         let complete = findings().complete(config());
         assert_eq!(complete.pose_net.metres_per_unit, 0.8);
         assert_eq!(complete.canonical_focal_px, None);

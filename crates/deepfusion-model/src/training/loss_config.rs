@@ -276,7 +276,7 @@ mod tests {
     use crate::{Error, Preset};
 
     #[test]
-    fn terms_go_off_and_on_by_name() {
+    fn terms_are_switched_by_name() {
         let start = Preset::Light.config().loss;
         let mut loss = start.clone();
         for term in super::LossConfig::TERMS {
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn what_means_nothing_is_refused_by_field() {
+    fn invalid_weights_are_refused_by_field() {
         let start = Preset::Light.config().loss;
         let field = |change: fn(&mut super::LossConfig)| {
             let mut loss = start.clone();

@@ -31,7 +31,7 @@ mod tests {
     use crate::config_keys;
 
     #[test]
-    fn a_slip_is_understood() {
+    fn misspelt_keys_get_suggestions() {
         let keys = config_keys();
         for (key, meant) in [
             ("bacth", &["batch"][..]),

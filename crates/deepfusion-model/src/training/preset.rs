@@ -102,7 +102,7 @@ impl Preset {
         }
     }
 
-    /// The configuration for training on such a device. On a processor, every preset uses images of 320×96 and a batch of 4, which learn in
+    /// The configuration for training on such a device. On a processor, every preset uses images of 320×96 and a batch of 4, which trains in
     /// minutes: twelve of 640×192 are twelve times as many pixels.
     #[must_use]
     pub fn config_on(self, compute: Compute) -> TrainConfig {

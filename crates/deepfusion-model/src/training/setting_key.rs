@@ -220,13 +220,13 @@ mod tests {
         Value::Table(toml::from_str(text).unwrap())
     }
 
-    fn said(key: &str, value: Option<Value>) -> String {
+    fn message(key: &str, value: Option<Value>) -> String {
         let mut config = config();
         put(&mut config, key, value).unwrap_err().to_string()
     }
 
     #[test]
-    fn an_element_of_a_list_is_set_alone() {
+    fn one_element_of_a_list_can_be_set() {
         let mut set = config();
         put(&mut set, "frames[1]", Some(Value::Integer(2))).unwrap();
         put(&mut set, "data.sets[1].learn", Some("depth".into())).unwrap();
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_optional_and_not_there_can_be_taken_away() {
+    fn a_missing_optional_value_can_be_removed() {
         let mut same = config();
         for key in [
             "data.sets[0].range",
@@ -251,62 +251,62 @@ mod tests {
             assert_eq!(same, config(), "{key}");
         }
         assert_eq!(
-            said("assumed_camera.hfov", None),
+            message("assumed_camera.hfov", None),
             "unknown key `assumed_camera.hfov`: did you mean `assumed_camera.hfov_deg`?"
         );
     }
 
     #[test]
-    fn a_place_beyond_the_end_says_how_long_the_list_is() {
+    fn an_index_beyond_the_end_is_refused_with_the_lists_length() {
         let value = || Some(Value::Integer(1));
         assert_eq!(
-            said("data.sets[2].learn", value()),
+            message("data.sets[2].learn", value()),
             "there is no `data.sets[2]`: the list has 2 elements, numbered from 0"
         );
         assert_eq!(
-            said("frames[7]", None),
+            message("frames[7]", None),
             "there is no `frames[7]`: the list has 2 elements, numbered from 0"
         );
         // An empty list is left out.
         assert_eq!(
-            said("augmentation.sizes[0].width", value()),
+            message("augmentation.sizes[0].width", value()),
             "there is no `augmentation.sizes[0]`: the list has 0 elements, numbered from 0"
         );
         assert_eq!(
-            said("augmentation.seizes[0].width", value()),
+            message("augmentation.seizes[0].width", value()),
             "unknown key `augmentation.seizes[0].width`: did you mean `augmentation.sizes[0].width`?"
         );
     }
 
     #[test]
-    fn places_belong_to_lists_and_names_to_tables() {
+    fn indices_need_a_list_and_names_a_table() {
         let value = || Some(Value::Integer(1));
-        assert_eq!(said("data[0].camera", value()), "`data` is not a list");
-        assert_eq!(said("batch[0]", value()), "`batch` is not a list");
+        assert_eq!(message("data[0].camera", value()), "`data` is not a list");
+        assert_eq!(message("batch[0]", value()), "`batch` is not a list");
         assert_eq!(
-            said("data.sets.name", value()),
+            message("data.sets.name", value()),
             "`data.sets` is a list of 2 elements: name one, such as data.sets[0]"
         );
         assert_eq!(
-            said("augmentation.sizes.width", value()),
+            message("augmentation.sizes.width", value()),
             "`augmentation.sizes` is an empty list: set the whole list first"
         );
         assert_eq!(
-            said("assumed_camera[0]", value()),
+            message("assumed_camera[0]", value()),
             "`assumed_camera` is not a list"
         );
         assert_eq!(
-            said("data.camera.name", value()),
+            message("data.camera.name", value()),
             "`data.camera` is a value, not a table"
         );
         assert_eq!(
-            said("frames[0]", None),
+            message("frames[0]", None),
             "`frames[0]` is one element of a list: set the whole list instead"
         );
     }
 
     #[test]
-    fn a_place_is_a_number_in_brackets() {
+    fn an_index_is_a_number_in_brackets() {
         for key in [
             "frames[one]",
             "frames[-1]",
@@ -315,7 +315,7 @@ mod tests {
             "frames[0",
             "frames[0]x",
         ] {
-            let problem = said(key, Some(Value::Integer(1)));
+            let problem = message(key, Some(Value::Integer(1)));
             assert_eq!(
                 problem,
                 format!(

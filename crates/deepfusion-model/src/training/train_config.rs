@@ -545,7 +545,7 @@ mod tests {
 
     /// A run from before this key existed is read with its default.
     #[test]
-    fn checkpoints_come_every_ten_minutes_unless_said_otherwise() {
+    fn checkpoints_are_due_every_ten_minutes_by_default() {
         let config = Preset::Tiny.config();
         assert_eq!(config.checkpoint_minutes, 10.0);
         let text = config.to_toml().unwrap();
@@ -563,7 +563,7 @@ mod tests {
     }
 
     #[test]
-    fn what_could_not_learn_or_not_see_is_refused_before_it_begins() {
+    fn networks_that_could_not_read_pairs_or_learn_are_refused() {
         let mut config = Preset::Tiny.config();
         config.pose_net.encoder.frames = 3;
         let error = config.validate().unwrap_err().to_string();
@@ -584,7 +584,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_the_network_go_on_and_off_by_name() {
+    fn parts_of_the_network_are_switched_by_name() {
         let start = Preset::Light.config();
         let mut config = start.clone();
         for term in TrainConfig::TERMS {
@@ -617,7 +617,7 @@ mod tests {
     /// Without the speed loss, PoseNet's poses are used for warping: `without` changes the setting, and setting another one afterwards is
     /// an error.
     #[test]
-    fn without_speed_the_views_follow_posenet() {
+    fn without_the_speed_loss_posenet_warps_the_views() {
         let mut config = Preset::Tiny.config();
         assert_ne!(config.view_motion, ViewMotion::PoseNet);
         assert_eq!(config.first_unit(0.7), 0.7);

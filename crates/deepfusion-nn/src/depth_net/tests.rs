@@ -3,7 +3,7 @@ use crate::{AttentionConfig, HceConfig, InputSize, ResNetDepth};
 use deepfusion_hint::Hint;
 
 #[test]
-fn sizes_that_do_not_halve_five_times_are_refused_with_the_nearest_that_does() {
+fn sizes_that_do_not_halve_five_times_are_refused_with_the_nearest_valid_one() {
     assert!(InputSize::new(640, 192).is_ok());
     let error = InputSize::new(1242, 375).unwrap_err();
     assert!(error.to_string().contains("1242x375"), "{error}");
@@ -24,7 +24,7 @@ fn a_config_without_the_optional_fields_is_the_published_network() {
 
 /// A network with the uncertainty head can start from one without, and the other way round; depth is the same either way.
 #[test]
-fn the_head_for_uncertainty_comes_and_goes() {
+fn the_uncertainty_head_can_be_added_and_left_out() {
     let device = Device::flex();
     let mut plain = DepthNetConfig::new(ResNetDepth::ResNet18);
     plain.encoder.base_width = 8;
@@ -63,7 +63,7 @@ fn the_head_for_uncertainty_comes_and_goes() {
 
 /// Every part has a switch of its own, and a part that is off has no tensors.
 #[test]
-fn each_part_is_switched_on_its_own() {
+fn each_part_has_its_own_switch() {
     let device = Device::flex();
     let image = Tensor::<4>::ones([1, 3, 64, 96], &device).mul_scalar(0.5);
     let names = |config: &DepthNetConfig| {
@@ -116,7 +116,7 @@ fn the_papers_config_survives_its_file() {
 }
 
 #[test]
-fn configs_that_mean_no_network_are_refused_by_field() {
+fn invalid_configs_are_refused_by_field() {
     let good = DepthNetConfig::new(ResNetDepth::ResNet18);
     let field = |change: fn(&mut DepthNetConfig)| {
         let mut config = good.clone();

@@ -152,7 +152,7 @@ fn the_flow_leads_from_the_first_frame_to_the_second() {
 }
 
 #[test]
-fn configs_that_mean_no_decoder_are_refused_by_field() {
+fn invalid_configs_are_refused_by_field() {
     let field = |change: fn(&mut FlowDecoderConfig)| {
         let mut config = FlowDecoderConfig::default();
         change(&mut config);

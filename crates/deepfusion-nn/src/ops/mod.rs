@@ -44,7 +44,7 @@ pub use composed::{
 pub use deepfusion_kernels::Precision;
 pub use kernel::ConvOptions;
 
-/// Whether a device is the CPU, on which the CPU's kernels run.
+/// Whether a device is the CPU, on which the kernels of `deepfusion-kernels` run.
 #[must_use]
 pub fn is_cpu(device: &Device) -> bool {
     matches!(

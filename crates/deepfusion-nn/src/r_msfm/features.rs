@@ -22,7 +22,7 @@ pub(super) fn reflected(
     config.init(rng, device)
 }
 
-/// Computes the input of R-MSFM6's repeated refinements from the state: tanh(3×1(tanh(1×3(x)))).
+/// Computes the input of R-MSFM6's second refinement at a level from the state x: tanh(3×1(tanh(1×3(x)))).
 #[derive(Module, Debug)]
 pub struct Context {
     /// 1×3.
@@ -58,7 +58,7 @@ pub struct Features {
     pub fine_reduce: Conv2d,
     /// After `fine_reduce`: 3×3 at stride 2.
     pub fine: Conv2d,
-    /// The repeated inputs of R-MSFM6, one for each feature from the coarsest to the finest; empty in R-MSFM3.
+    /// The inputs of R-MSFM6's second refinements, one for each feature from the coarsest to the finest; empty in R-MSFM3.
     pub context: Vec<Context>,
 }
 
@@ -84,11 +84,11 @@ impl Features {
     /// The input of a refinement.
     pub(super) fn next(
         &self,
-        taken_up: RefinementInput,
+        input: RefinementInput,
         features: &[Tensor<4>; 3],
         state: Tensor<4>,
     ) -> Tensor<4> {
-        match taken_up {
+        match input {
             RefinementInput::Again(level) => self.context[level].forward(state),
             RefinementInput::Middle => self.middle.forward(features[1].clone()).tanh(),
             RefinementInput::Fine => {

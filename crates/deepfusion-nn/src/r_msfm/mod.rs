@@ -86,8 +86,8 @@ impl RMsfm {
         };
         for index in 0..config.iterations {
             if index > 0 {
-                let taken_up = config.taken_up(index);
-                let seen = self.features.next(taken_up, &features, state.clone());
+                let input = config.refinement_input(index);
+                let seen = self.features.next(input, &features, state.clone());
                 state = self.gru.forward(state, seen);
             }
             let (refined, seen) = self.update.forward(state.clone(), logit);

@@ -154,7 +154,7 @@ fn pose_decoder_name(name: &str) -> Option<String> {
     Some(format!("{part}.{rest}"))
 }
 
-/// `encoder.pth` holds `height`, `width` and `use_stereo` beside its tensors.
+/// `encoder.pth` has `height`, `width` and `use_stereo` beside its tensors.
 pub(super) fn input_size(encoder: &Path) -> Option<InputSize> {
     let PickleValue::Dict(entries) = PytorchReader::read_pickle_data(encoder, None).ok()? else {
         return None;

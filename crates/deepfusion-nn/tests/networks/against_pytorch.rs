@@ -139,7 +139,7 @@ fn torchvision_resnet50_on_two_frames() {
 }
 
 #[test]
-fn the_pth_files_hold_the_formula_to_the_last_bit() {
+fn the_pth_files_have_the_formulas_weights_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let listings = manifest();
     for (file, listing) in [

@@ -65,7 +65,7 @@ fn the_published_network() {
 
 /// PyTorch counts the same number.
 #[test]
-fn parameters_are_those_published() {
+fn the_number_of_parameters_is_the_published_one() {
     let device = Device::flex();
     let config = DepthNetConfig::disp_net();
     let net = DepthNet::new(&config, &device).unwrap();
@@ -106,7 +106,7 @@ fn other_files_are_refused_by_name() {
 
 /// Training programs save weights beside an epoch and an optimiser's state, which has tensors, too.
 #[test]
-fn weights_are_found_beside_what_else_a_training_saved() {
+fn weights_are_found_beside_an_optimisers_state() {
     for name in ["state_dict.pth", "state_dict_legacy.pth"] {
         let weights = weights::read(&reference(name)).unwrap();
         let names: Vec<_> = weights.tensors.keys().collect();

@@ -105,7 +105,7 @@ fn the_files_of_torch() {
 /// 3.1, 2.5, 2.2 and 8.7 million parameters are published; the networks have 3.07, 2.47, 2.15 and 8.77. In a published file, each dilated
 /// block has two tensors (of a layer norm) that no computation reads; they are not counted.
 #[test]
-fn parameters_are_those_published() {
+fn the_numbers_of_parameters_are_the_published_ones() {
     let device = Device::flex();
     let listings = listings();
     for ((model, size), published) in NAMES.into_iter().zip([3.1e6, 2.5e6, 2.2e6, 8.7e6]) {

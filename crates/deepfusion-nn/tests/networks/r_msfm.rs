@@ -64,7 +64,7 @@ fn both_published_networks() {
 
 /// 3.5 and 3.8 million parameters are published.
 #[test]
-fn parameters_are_those_published() {
+fn the_numbers_of_parameters_are_the_published_ones() {
     let device = Device::flex();
     for (iterations, exact) in [(3, 3_519_364), (6, 3_815_044)] {
         let config = DepthNetConfig::r_msfm(iterations);

@@ -149,7 +149,7 @@ fn statistics(net: &DepthNet) -> Vec<Vec<f32>> {
 }
 
 #[test]
-fn only_training_moves_the_statistics() {
+fn only_training_changes_the_statistics() {
     let device = Device::flex().autodiff();
     let net = tiny(&device);
     let x = images("images", 3, &device);
@@ -242,7 +242,7 @@ fn a_new_network_starts_at_ten_metres() {
 }
 
 #[test]
-fn a_seed_fixes_every_weight() {
+fn a_seed_determines_every_weight() {
     let device = Device::flex();
     let config = DepthNetConfig::new(ResNetDepth::ResNet18);
     let weights = |seed| collect(&DepthNet::with_seed(&config, seed, &device).unwrap());

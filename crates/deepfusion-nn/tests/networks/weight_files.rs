@@ -33,7 +33,7 @@ fn tiny(seed: u64) -> DepthNet {
 }
 
 #[test]
-fn a_network_survives_the_way_through_a_file_to_the_last_bit() {
+fn a_network_is_written_and_read_bit_for_bit() {
     let device = Device::flex().autodiff();
     let net = tiny(1);
     net.forward(images("images", 3, &device)); // Changes the running statistics from 0 and 1.
@@ -145,7 +145,7 @@ fn an_unexpected_tensor_is_named() {
 }
 
 #[test]
-fn another_shape_is_named_with_both() {
+fn a_wrong_shape_is_named_with_the_expected_one() {
     let error = full_of(|w| {
         w.tensors.get_mut("encoder.conv1.weight").unwrap().shape = vec![4, 3, 49];
     });
@@ -167,7 +167,7 @@ fn values_that_are_not_finite_are_refused() {
 }
 
 #[test]
-fn files_that_are_no_weights_say_what_they_are() {
+fn files_that_are_not_weights_are_refused_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("weights.safetensors");
     let reason = |bytes: &[u8]| {
@@ -204,7 +204,7 @@ fn files_cut_short_are_refused_wherever_the_cut_is() {
 }
 
 #[test]
-fn nothing_is_left_of_a_file_that_could_not_be_written() {
+fn a_failed_write_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     // There is a folder of that name: everything is written, but the renaming at the end fails.
     let path = folder.path().join("taken");

@@ -58,7 +58,7 @@ fn step(count: i32) -> AdamStep {
 
 /// A step works with factors that were computed on the device. A step that is not made changes nothing, whatever its gradient is.
 #[test]
-fn the_device_may_decide_about_a_step_of_adam() {
+fn the_device_may_decide_about_a_step() {
     let plain = device().inner();
     let values = random([1_031], &plain);
     let moments = [random([1_031], &plain), random([1_031], &plain)].map(Tensor::abs);

@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bar_each_and_a_gap_where_there_is_nothing() {
+    fn missing_values_leave_gaps_between_bars() {
         let groups = ["0 to 10 m", "10 to 20 m", "<&>"].map(str::to_owned);
         let svg = BarChart::new("Abs Rel", "range", groups)
             .bars("a", vec![Some(0.1), None, Some(f64::NAN)])

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_axes_and_key_are_there() {
+    fn a_chart_has_lines_axes_and_a_legend() {
         let loss = (0..2000)
             .map(|i| (f64::from(i), 1.0 / (1.0 + f64::from(i) / 100.0)))
             .collect();
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_constants_are_drawn_too() {
+    fn empty_and_constant_series_are_drawn() {
         assert!(LineChart::new("t", "x").to_svg().contains("no values"));
         let nan = LineChart::new("t", "x")
             .line("a", vec![(0.0, f64::NAN)])

@@ -5,7 +5,7 @@ use super::axis::{
 };
 use crate::html::escape;
 
-/// Most dots that are drawn, as more would not be visible: an even selection.
+/// Most dots that are drawn, evenly selected: more would not be visible.
 const MOST_DOTS: usize = 1500;
 
 /// A dot for each pair of numbers, on equal axes with the diagonal: predicted over true, observed over expected.

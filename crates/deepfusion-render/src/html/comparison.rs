@@ -5,7 +5,8 @@ use deepfusion_eval::compare::{Rank, Table, Tables};
 use super::{Cell, HtmlReport, Mark};
 
 impl HtmlReport {
-    /// Adds tables of evaluations, a section each. The best and second best of each column are marked, implausible rows have their reasons.
+    /// Adds tables of evaluations, a section each. The best and second best of each column are marked; implausible rows carry a sign and
+    /// footnotes with the reasons.
     #[must_use]
     pub fn comparison(mut self, tables: &Tables) -> Self {
         for note in &tables.notes {
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_cannot_be_right_carry_a_sign() {
+    fn implausible_rows_are_marked() {
         let tables = published_tables().unwrap();
         let html = HtmlReport::new("t", "s").comparison(&tables).to_html();
         check_page(&html);

@@ -315,7 +315,7 @@ mod tests {
     use crate::LineChart;
 
     #[test]
-    fn the_page_needs_nothing_from_outside() {
+    fn the_page_has_no_external_resources() {
         let picture = RgbImage::new(20, 10);
         let html = HtmlReport::new("A <b>", "sub & title")
             .picture("street", &picture, PictureFormat::Jpeg)
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_grid_has_as_many_places_in_every_row() {
+    fn short_grid_rows_are_filled_with_empty_cells() {
         let tile = |caption: &str| Tile::new(caption, RgbImage::new(8, 4));
         let rows = [vec![tile("a"), tile("b"), tile("c")], vec![tile("<d>")]];
         let page = HtmlReport::new("t", "s").wide().picture_grid(&rows);
@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_written_as_a_file() {
+    fn the_page_is_written_to_a_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("report.html");
         HtmlReport::new("t", "s").write(&path).unwrap();

@@ -147,7 +147,7 @@ mod tests {
     use deepfusion_eval::verdict::{NoCertificate, speed_rows};
 
     #[test]
-    fn without_a_certificate_the_reason_is_there() {
+    fn a_missing_certificate_is_explained() {
         let verdict = Verdict {
             no_certificate: Some(NoCertificate::AllSeen),
             ..Verdict::default()
@@ -160,7 +160,7 @@ mod tests {
 
     /// A way of estimating speed that has no results has no column.
     #[test]
-    fn speeds_have_a_column_for_each_way_to_see_them() {
+    fn estimates_without_results_have_no_column() {
         let mut verdict = Verdict::default();
         verdict.without_truth.speeds = speed_rows(&[(2.0, 0.0), (30.0, 0.0)]);
         verdict.without_truth.pose_speeds = speed_rows(&[(30.0, 0.0)]);

@@ -6,11 +6,11 @@ use super::line::line;
 use crate::captioned::{INK, PAPER};
 use crate::text::{TextSize, draw_text};
 
-/// Colour of free ground, and of occupied ground.
+/// Colour of free ground.
 const FREE: Rgb<u8> = Rgb([226, 240, 226]);
-/// See [`FREE`].
+/// Colour of occupied ground.
 const OCCUPIED: Rgb<u8> = Rgb([120, 120, 128]);
-/// Distance between lines: ten metres.
+/// Colour of the lines, one every ten metres.
 const GRID: Rgb<u8> = Rgb([200, 204, 212]);
 /// Seconds of motion that an arrow shows.
 const ARROW_S: f64 = 1.0;
@@ -66,8 +66,8 @@ pub fn birds_eye(
         }
         let centre = on_ground(target.center_m);
         if let (Some(true), Some(v)) = (target.moving, target.velocity_mps) {
-            let there: [f64; 3] = std::array::from_fn(|i| target.center_m[i] + ARROW_S * v[i]);
-            line(&mut picture, centre, on_ground(there), 2, colour);
+            let later: [f64; 3] = std::array::from_fn(|i| target.center_m[i] + ARROW_S * v[i]);
+            line(&mut picture, centre, on_ground(later), 2, colour);
         }
         let at = (centre[0] as i32 + 4, centre[1] as i32 - 5);
         draw_text(

@@ -45,7 +45,7 @@ fn draw_box(picture: &mut RgbImage, k: &Intrinsics, target: &Target, thickness: 
     }
 }
 
-/// Both ends of an edge in the image, clipped to the space before the camera.
+/// Both ends of an edge in the image, clipped to the space in front of the camera.
 fn projected(k: &Intrinsics, mut a: Vector3<f64>, mut b: Vector3<f64>) -> Option<[[f64; 2]; 2]> {
     if a.z < NEAR_M && b.z < NEAR_M {
         return None;

@@ -68,9 +68,9 @@ mod tests {
     use super::ExpectedSetting as Expected;
 
     #[test]
-    fn a_setting_is_said_in_words_with_its_unit() {
+    fn expected_values_are_printed_with_their_unit() {
         let (from, to) = (-0.5, 100_000.0);
-        for (expected, said) in [
+        for (expected, message) in [
             (Expected::Within { from, to }, "-0.5 to 100000"),
             (Expected::Metres { from, to }, "-0.5 to 100000 metres"),
             (Expected::Degrees { from, to }, "-0.5 to 100000 degrees"),
@@ -85,7 +85,7 @@ mod tests {
                 "urban, park or night",
             ),
         ] {
-            assert_eq!(expected.to_string(), said);
+            assert_eq!(expected.to_string(), message);
         }
     }
 }

@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fog_takes_what_is_far_and_leaves_what_is_near() {
+    fn fog_hides_far_surfaces_and_leaves_near_ones() {
         let fog = Fog {
             extinction: 0.01,
             colour: Rgb::new(0.8, 0.8, 0.8),

@@ -16,13 +16,13 @@ fn street(seed: u64) -> (World, Riders) {
     let mut world = World::furnish(road, seed, Scene::Urban);
     let models = world.people();
     let traffic = Traffic::new(&mut rng, &world, &drive, DURATION_S, 3);
-    let way = (&drive, DURATION_S);
-    let riders = Riders::along(&mut rng, &world, &models, way, &traffic, 12);
+    let driven = (&drive, DURATION_S);
+    let riders = Riders::along(&mut rng, &world, &models, driven, &traffic, 12);
     (world, riders)
 }
 
 #[test]
-fn a_route_goes_on_at_one_speed() {
+fn a_route_has_constant_speed() {
     let route = Route {
         s: 20.0,
         lateral: -6.0,
@@ -121,7 +121,7 @@ fn people_keep_apart() {
 
 /// A LiDAR sees the same people a moment later, even at the instant in which somebody appears or disappears.
 #[test]
-fn whoever_leaves_does_not_stop_the_others() {
+fn people_keep_moving_when_another_leaves() {
     let (world, riders) = street(1);
     let ends: Vec<f64> = (riders.people.iter())
         .flat_map(|person| [person.during.0, person.during.1])

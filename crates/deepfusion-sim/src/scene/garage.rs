@@ -1,4 +1,4 @@
-//! A car park under ground: a lane between bays, pillars, walls, a low ceiling, lamps.
+//! An underground car park: a lane between bays, pillars, walls, a low ceiling, lamps.
 
 use super::{World, cars};
 use crate::primitive::Shape;

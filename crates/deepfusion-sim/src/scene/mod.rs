@@ -57,7 +57,7 @@ pub enum ObjectClass {
     Misc,
 }
 
-/// Something on the street, with its exact box.
+/// An object on the street, with its exact box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneObject {
     /// Identity of the object, constant over frames.

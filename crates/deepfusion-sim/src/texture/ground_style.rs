@@ -233,8 +233,8 @@ impl GroundStyle {
         if paint <= 0.0 {
             return 0.0;
         }
-        let gone = noise.fractal(p.x + 3.0, p.y, 0.9, 5, 0.8, p.size);
-        let kept = (1.0 - self.wear * (0.6 + 0.9 * gone)).clamp(0.05, 1.0);
+        let worn = noise.fractal(p.x + 3.0, p.y, 0.9, 5, 0.8, p.size);
+        let kept = (1.0 - self.wear * (0.6 + 0.9 * worn)).clamp(0.05, 1.0);
         paint * kept * beyond(-p.kerb, 0.05, fl)
     }
 

@@ -167,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn noise_is_bounded_continuous_and_of_its_seed() {
+    fn noise_is_bounded_continuous_and_fixed_by_its_seed() {
         let (a, b) = (Noise::new(1), Noise::new(2));
         let mut differ = false;
         for i in 0..2000 {

@@ -411,7 +411,7 @@ mod tests {
     use rand::SeedableRng;
 
     #[test]
-    fn albedos_are_albedos_and_coarse_pixels_see_the_mean() {
+    fn albedos_are_in_range_and_coarse_pixels_get_the_mean() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let noise = Noise::new(3);
         let (mut darkest, mut brightest) = (1.0f32, 0.0f32);

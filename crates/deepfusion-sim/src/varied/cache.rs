@@ -69,7 +69,7 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[test]
-    fn it_stays_small_and_forgets_what_was_not_asked_for() {
+    fn the_cache_stays_small_and_drops_the_least_recently_used() {
         let cache = Cache::new(3);
         let built = AtomicUsize::new(0);
         let get = |key: u64| {
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn one_thing_is_built_once_and_others_beside_it() {
+    fn an_object_is_built_once_and_others_in_parallel() {
         let cache = Cache::new(4);
         let built = AtomicUsize::new(0);
         // Both builders must be inside at the same time: a lock held while building would deadlock here.

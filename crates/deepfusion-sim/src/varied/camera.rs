@@ -381,7 +381,7 @@ mod tests {
     use crate::varied::draw::generator;
 
     #[test]
-    fn lenses_are_within_their_bounds_and_dense_where_cars_have_theirs() {
+    fn lenses_are_within_their_bounds_and_mostly_like_those_on_cars() {
         let mut rng = generator(1, 1, 1);
         let (mut usual, mut square, mut like_kitti) = (0, 0, 0);
         for _ in 0..5000 {

@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_fit_what_else_is_asked_for() {
+    fn scenes_must_fit_the_other_settings() {
         let of = |scenes: &[Scene], plain| EndlessConfig {
             scenes: scenes.to_vec(),
             plain,

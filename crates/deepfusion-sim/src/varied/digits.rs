@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_has_the_digits_of_a_text() {
+    fn a_json_value_has_the_digits_of_the_json_text() {
         let whole = WithNumbers {
             part: Numbers {
                 share: 0.3,

@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hiss_is_standard() {
+    fn fast_noise_has_mean_zero_and_variance_one() {
         let mut noise = FastNoise::new(3);
         let draws: Vec<f64> = (0..100_000).map(|_| f64::from(noise.next())).collect();
         let mean = draws.iter().sum::<f64>() / 1e5;
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn normals_are_normal_and_cut() {
+    fn normal_draws_are_normal_and_clamped() {
         let mut rng = generator(1, 2, 3);
         let draws: Vec<f64> = (0..20_000)
             .map(|_| normal(&mut rng, 5.0, 2.0, 1.5))
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn weights_are_kept() {
+    fn draws_follow_their_weights() {
         let mut rng = generator(1, 2, 3);
         let twos = (0..10_000)
             .filter(|_| weighted(&mut rng, &[(1.0, 1), (3.0, 2)]) == 2)
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn generators_differ_in_each_of_their_numbers() {
+    fn each_argument_changes_the_generator() {
         let first = |a, b, c| generator(a, b, c).random::<u64>();
         let all = [
             first(1, 1, 1),

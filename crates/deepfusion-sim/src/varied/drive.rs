@@ -306,19 +306,19 @@ mod tests {
     }
 
     #[test]
-    fn what_was_drawn_is_said() {
+    fn drawn_values_are_in_the_json() {
         let look = look(Scene::Urban, 2);
         let text = look.drawn().to_json();
-        let said: serde_json::Value = serde_json::from_str(&text).unwrap();
-        let height = said["camera"]["height_m"].as_f64().unwrap();
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let height = json["camera"]["height_m"].as_f64().unwrap();
         assert!((height - look.height_m()).abs() < 1e-9);
-        assert_eq!(said["light"]["weather"], look.drawn().light.weather.name());
-        assert_eq!(said["world"]["varied"], false);
+        assert_eq!(json["light"]["weather"], look.drawn().light.weather.name());
+        assert_eq!(json["world"]["varied"], false);
         for part in ["lens", "sensor", "processing", "jpeg_quality"] {
-            assert!(said["imaging"].get(part).is_some(), "{part}: {text}");
+            assert!(json["imaging"].get(part).is_some(), "{part}: {text}");
         }
-        assert!(said["imaging"]["lens"].get("shake").is_none());
-        assert!(said["light"]["sun_elevation_degrees"].is_f64(), "{text}");
+        assert!(json["imaging"]["lens"].get("shake").is_none());
+        assert!(json["light"]["sun_elevation_degrees"].is_f64(), "{text}");
     }
 
     #[test]

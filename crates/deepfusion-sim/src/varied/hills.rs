@@ -52,7 +52,7 @@ impl Pole {
 /// The poles and trunks near enough that a missing piece would be visible.
 fn poles(world: &World, eye: &Vector3<f64>, heading: f64) -> Vec<Pole> {
     let (sin, cos) = heading.sin_cos();
-    let lean = (0.5 * SHARPEST).tan();
+    let tilt = (0.5 * SHARPEST).tan();
     let pole = |solid: &Primitive| {
         let upright = match solid.shape {
             Shape::Cylinder { .. } => true,
@@ -69,7 +69,7 @@ fn poles(world: &World, eye: &Vector3<f64>, heading: f64) -> Vec<Pole> {
         let near = (0.0..120.0).contains(&along) && lateral.abs() < 40.0;
         (upright && near && radius < 0.6 && top > 1.5).then(|| Pole {
             along,
-            reach: f64::from(radius) + lean * top,
+            reach: f64::from(radius) + tilt * top,
         })
     };
     world.primitives.iter().filter_map(pole).collect()
@@ -84,8 +84,8 @@ fn draw(rng: &mut ChaCha8Rng, world: &World, world_from_cam: &Se3) -> Folds {
     let road = world.road.sample(index).heading;
     let looks = world_from_cam.rotate(&Vector3::z());
     let along = looks.x * road.cos() + looks.y * road.sin();
-    let way = if along < 0.0 { PI } else { 0.0 };
-    let heading = road + way + normal(rng, 0.0, 0.06, 2.5);
+    let direction = if along < 0.0 { PI } else { 0.0 };
+    let heading = road + direction + normal(rng, 0.0, 0.06, 2.5);
     let poles = poles(world, &eye, heading);
     let mut creases = Vec::new();
     let mut distance = log_uniform(rng, 6.0, 40.0);

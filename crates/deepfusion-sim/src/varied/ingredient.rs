@@ -171,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_those_of_files() {
+    fn names_parse_and_an_unknown_one_lists_all() {
         for one in Ingredient::ALL {
             assert_eq!(one.name().parse::<Ingredient>().ok(), Some(one));
             let error = "salt".parse::<Ingredient>().unwrap_err().to_string();
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kitti_lens_is_as_wide_at_any_size() {
+    fn a_kitti_lens_has_the_same_field_of_view_at_any_size() {
         let lens = Lens {
             field: 1.0,
             unequal: 0.01,

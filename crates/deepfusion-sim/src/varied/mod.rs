@@ -202,7 +202,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn worlds_are_of_the_scenes_asked_for() -> Result<()> {
+    fn worlds_have_the_requested_scenes() -> Result<()> {
         let endless = Endless::new(EndlessConfig {
             width: 64,
             height: 32,

@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_moves_on_its_springs_alone() {
+    fn a_pose_varies_only_as_the_springs_allow() {
         let camera = MountedCamera {
             pitch_degrees: 3.0,
             ..kitti()
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_mounting_is_named() {
+    fn invalid_mountings_are_named() {
         let broken = |change: fn(&mut MountedCamera)| {
             let mut camera = kitti();
             change(&mut camera);

@@ -43,7 +43,7 @@ mod tests {
     use std::collections::{HashMap, HashSet};
 
     #[test]
-    fn neighbours_are_of_different_worlds_and_each_world_has_its_views() {
+    fn neighbours_have_different_worlds_and_each_world_has_all_its_views() {
         let schedule = Schedule::new(16, 24);
         let turns: Vec<ScheduledView> = (0..16 * 24 * 5).map(|i| schedule.view_at(i)).collect();
         for window in turns.windows(16) {
@@ -54,8 +54,8 @@ mod tests {
         for view in &turns {
             seen.entry(view.world).or_default().push(view.view);
         }
-        let whole = seen.values().filter(|views| views.len() == 24).count();
-        assert!(whole >= 16 * 4);
+        let complete = seen.values().filter(|views| views.len() == 24).count();
+        assert!(complete >= 16 * 4);
         for views in seen.values() {
             let distinct: HashSet<&u64> = views.iter().collect();
             assert_eq!(distinct.len(), views.len());
@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn worlds_change_one_after_another() {
+    fn worlds_are_replaced_one_at_a_time() {
         let schedule = Schedule::new(16, 24);
         let mut known: HashSet<u64> = (0..64).map(|i| schedule.view_at(i).world).collect();
         for start in (64..64 + 16 * 48).step_by(16) {

@@ -61,8 +61,9 @@ pub(super) fn plain(world: &World) -> Weather {
     }
 }
 
-/// Draws the weather: by day 42 % clear, 20 % cloudy, 33 % overcast, 5 % fog. Without fog there is haze in 65 % of the views, with a
-/// visibility of 0.5 to 20 km. The ground is wet in a third of the views without sun, and in a tenth of the others.
+/// Draws the weather. By day: 42 % clear, 20 % cloudy, 33 % overcast, 5 % fog. Without fog there is haze in 65 % of the views, with a
+/// visibility of 0.5 to 20 km. The ground is wet in a third of the overcast and foggy views, and in a tenth of the others. At night: 30 %
+/// with fog, and wet ground in a quarter.
 pub(super) fn draw(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
     match world.scene {
         Scene::Garage | Scene::Indoor => (Weather::Indoor, indoor(rng, world)),

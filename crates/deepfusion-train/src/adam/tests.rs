@@ -65,7 +65,7 @@ fn apart(one: &Weights, other: &Weights) -> f64 {
 /// after a restart from a checkpoint. Single parameters may differ: Adam divides a gradient by its size, and a gradient near zero by its
 /// rounding error.
 #[test]
-fn both_ways_are_the_same_optimiser() {
+fn tensor_operations_and_kernel_train_alike() {
     let [start, ours, _] = learned(false, 99);
     let moved = apart(&start, &ours);
     let [_, theirs, state] = learned(true, 99);
@@ -80,7 +80,7 @@ fn both_ways_are_the_same_optimiser() {
 
 /// From the same gradients, tensor operations and the kernel make the same step.
 #[test]
-fn a_step_is_the_kernels() {
+fn tensor_operations_make_the_kernels_step() {
     let device = Device::flex();
     let start = [1.0_f32, -2.0, 0.5, 1e-3];
     let (mut p, mut m, mut v) = (start.to_vec(), vec![0.0; 4], vec![0.0; 4]);

@@ -378,7 +378,7 @@ fn parameters<M: Module>(module: &M, raw: Gradients) -> Vec<f32> {
 }
 
 /// All of a network's outputs in one tensor.
-fn whole<const D: usize>(outputs: Vec<Tensor<D>>) -> Tensor<1> {
+fn concatenated<const D: usize>(outputs: Vec<Tensor<D>>) -> Tensor<1> {
     let outputs = outputs.into_iter().map(|output| {
         let count = output.shape().num_elements();
         output.reshape([count])
@@ -389,7 +389,7 @@ fn whole<const D: usize>(outputs: Vec<Tensor<D>>) -> Tensor<1> {
 #[expect(clippy::expect_used, reason = "the presets' networks can be built")]
 fn depth_net(config: &DepthNetConfig, on: &Inputs) -> Outcome {
     let net = DepthNet::new(config, &on.device).expect("a preset's network");
-    let result = whole(net.forward(on.fixed([2, 3, 64, 96], 40, IMAGE)));
+    let result = concatenated(net.forward(on.fixed([2, 3, 64, 96], 40, IMAGE)));
     let forward = vec![values(result.clone())];
     Outcome {
         forward,
@@ -405,7 +405,7 @@ fn pose_net(on: &Inputs) -> Outcome {
     let net = PoseNet::new(&config, &on.device);
     let net = net.expect("a preset's network");
     let motion = net.forward(on.fixed([2, 6, 64, 96], 41, IMAGE));
-    let result = whole(vec![
+    let result = concatenated(vec![
         motion.axis_angle.mul_scalar(100.0),
         motion.translation,
     ]);

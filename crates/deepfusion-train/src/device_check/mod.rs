@@ -179,7 +179,7 @@ mod tests {
     /// Rounding errors in the inputs, as from another order of summation, must pass; errors a thousand times as large must fail. So every
     /// case is sensitive enough, and none depends on a single pixel.
     #[test]
-    fn rounding_is_right_and_a_percent_is_wrong() {
+    fn rounding_errors_pass_and_larger_errors_fail() {
         for case in cases::all() {
             let with = |rounding| {
                 (case.run)(&Inputs {
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_is_measured() {
+    fn differences_are_relative_to_the_largest_value() {
         let apart = |right: &[f32], found: &[f32]| apart(&[right.to_vec()], &[found.to_vec()]);
         assert_eq!(apart(&[1.0, -4.0], &[1.0, -3.0]), 0.25);
         assert_eq!(apart(&[1.0, f32::NAN], &[1.0, f32::NAN]), 0.0);
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn why_an_operation_failed_is_said() {
+    fn a_failure_has_the_panics_message() {
         let panicked = OperationFailure::Panicked("out of memory".into());
         assert_eq!(panicked.to_string(), "out of memory");
         let ended = OperationFailure::ProcessEnded(ExitStatus::default());

@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_device_is_good_for_follows_from_what_is_wrong() {
+    fn one_wrong_operation_limits_the_use_of_a_device() {
         for (wrong, forward, predicts, trains) in [
             (NeededBy::Network, true, false, false),
             (NeededBy::Network, false, true, false),
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn what_to_do_without_follows_from_what_differs() {
+    fn optional_parts_with_wrong_operations_are_left_out() {
         let of = |wrong: &[(NeededBy, bool)]| checks(wrong).good_for();
         let without = |parts: &[NeededBy]| DeviceUse::TrainingWithout(parts.to_vec());
         assert_eq!(of(&[(NeededBy::Network, true)]), DeviceUse::Nothing);

@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn broken_images_are_named_or_counted() {
-        let said = |broken, images: &[&str]| {
+        let message = |broken, images: &[&str]| {
             let reason = Skipped::BrokenImages {
                 drive: "monday".into(),
                 broken,
@@ -130,11 +130,11 @@ mod tests {
             reason.to_string()
         };
         assert_eq!(
-            said(1, &["a.png: cut"]),
+            message(1, &["a.png: cut"]),
             "monday: 1 of 40 images cannot be read and is left out: a.png: cut"
         );
         assert_eq!(
-            said(5, &["a.png: cut", "b.png: cut"]),
+            message(5, &["a.png: cut", "b.png: cut"]),
             "monday: 5 of 40 images cannot be read and are left out: a.png: cut; b.png: cut; and 3 more"
         );
     }

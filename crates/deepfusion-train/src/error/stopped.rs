@@ -11,7 +11,7 @@ pub enum LoaderProblem {
     Panicked {
         /// The batch, counted from 0.
         batch: usize,
-        /// The panic's message, where it has one.
+        /// The panic's message, if it has one.
         text: Option<String>,
     },
     /// Its thread ended early.

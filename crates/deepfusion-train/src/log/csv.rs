@@ -41,7 +41,7 @@ fn header() -> String {
 }
 
 /// A line of a log that another version may have begun, rearranged into the current columns. Missing values are empty.
-fn arranged(columns: &str, line: &str) -> String {
+fn rearranged(columns: &str, line: &str) -> String {
     let values: HashMap<&str, &str> = columns.split(',').zip(line.split(',')).collect();
     let header = header();
     let of = |name| values.get(name).copied().unwrap_or_default();
@@ -65,7 +65,7 @@ impl CsvLog {
                 let line = line.map_err(io("read"))?;
                 let of = line.split(',').next().and_then(|s| s.parse::<usize>().ok());
                 if of.is_some_and(|of| of <= step) {
-                    kept.push(arranged(&columns, &line));
+                    kept.push(rearranged(&columns, &line));
                 }
             }
         }
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_validation_says_what_best_is_chosen_by() {
+    fn validation_rows_have_the_value_that_best_is_chosen_by() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         let mut log = CsvLog::open(&path, 0).unwrap();
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_resumed_log_goes_on_where_the_checkpoint_was() {
+    fn a_resumed_log_continues_at_the_checkpoint() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         let write = |from: usize, steps: std::ops::RangeInclusive<usize>| {
@@ -156,7 +156,7 @@ mod tests {
 
     /// If a log of an earlier version lacks a column, its lines stay and the missing values are empty.
     #[test]
-    fn a_log_with_other_columns_goes_on_with_those_of_today() {
+    fn an_older_log_is_rearranged_into_the_current_columns() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         std::fs::write(&path, "step,total,split\n1,0.5,train\n2,0.4,train\n").unwrap();

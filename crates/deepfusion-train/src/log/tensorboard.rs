@@ -113,7 +113,7 @@ mod tests {
 
     /// The check value of CRC-32C over "123456789" is 0xE3069283 (RFC 3720's polynomial).
     #[test]
-    fn the_checksum_is_castagnolis() {
+    fn the_checksum_is_crc_32c() {
         let crc = 0xE306_9283_u32;
         let masked = crc.rotate_right(15).wrapping_add(0xA282_EAD8);
         assert_eq!(masked_crc(b"123456789"), masked);

@@ -105,7 +105,7 @@ mod tests {
     /// Two frames of one row. All pixels stay in place, except that one pixel of the first frame moves to a place where the second frame
     /// shows another point. Neither that pixel nor the pixel of the second frame in its old place comes back.
     #[test]
-    fn what_is_hidden_or_moves_is_left_out() {
+    fn hidden_and_dynamic_pixels_are_left_out() {
         let device = Device::flex();
         let mask = |values: [[f32; 8]; 2]| {
             let [a, b] = values;

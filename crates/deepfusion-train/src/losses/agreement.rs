@@ -41,7 +41,7 @@ mod tests {
     use burn::tensor::Device;
 
     #[test]
-    fn what_stands_still_in_the_image_does_not_draw_its_depth_to_infinity() {
+    fn pixels_that_standing_still_explains_are_left_out() {
         let device = Device::flex();
         let row = |values: [f32; 4]| Tensor::<4>::from_data([[[values]]], &device);
         // Explained by both; by the flow alone; by neither better than by standing still; by the warp alone.

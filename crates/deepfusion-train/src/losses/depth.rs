@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_is_not_seen_and_nothing_known_costs_nothing() {
+    fn unknown_depth_is_ignored_and_without_known_depth_the_loss_is_zero() {
         let device = Device::flex();
         let truth = truth(&device);
         let mut values = vec![0.1_f32; 18];

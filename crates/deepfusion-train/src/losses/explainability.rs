@@ -74,7 +74,7 @@ mod tests {
 
     /// Three pixels and two sources, by hand.
     #[test]
-    fn every_source_counts_as_far_as_it_explains() {
+    fn every_source_is_weighted_by_its_mask() {
         let device = Device::flex();
         let row = |values: [f32; 3]| Tensor::<4>::from_data([[[values]]], &device);
         let view = |error, seen, constant| View {

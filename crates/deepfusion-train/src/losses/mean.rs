@@ -40,7 +40,7 @@ mod tests {
     use burn::tensor::Device;
 
     #[test]
-    fn only_true_pixels_count_and_none_is_zero() {
+    fn only_true_pixels_count_and_without_any_the_mean_is_zero() {
         let device = Device::flex();
         let values = Tensor::<4>::from_data([[[[1.0, f32::NAN]], [[3.0, 9.0]]]], &device);
         let mask = Tensor::<4>::from_data([[[[1.0, 0.0]]]], &device);
@@ -54,7 +54,7 @@ mod tests {
 
     /// One image has one valid pixel, the other three.
     #[test]
-    fn images_count_alike_whatever_they_show() {
+    fn images_have_equal_weight_however_many_pixels_count() {
         let device = Device::flex();
         let values = Tensor::<4>::from_data([[[[6.0, 9.0, 9.0]]], [[[1.0, 2.0, 3.0]]]], &device);
         let mask = Tensor::<4>::from_data([[[[1.0, 0.0, 0.0]]], [[[1.0; 3]]]], &device);
@@ -64,7 +64,7 @@ mod tests {
 
     /// An image without valid pixels adds nothing to the mean or its gradient, and does not enlarge the other image's gradient.
     #[test]
-    fn an_image_that_shows_nothing_counts_as_zero() {
+    fn an_image_without_valid_pixels_counts_as_zero() {
         let device = Device::flex().autodiff();
         let values = Tensor::<4>::from_data([[[[2.0, 4.0]]], [[[f32::NAN, 5.0]]]], &device);
         let values = values.require_grad();

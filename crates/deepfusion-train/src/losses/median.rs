@@ -126,7 +126,7 @@ mod tests {
 
     /// Counting finds the same median as selection, for even and odd numbers of values, equal values, one value and none.
     #[test]
-    fn both_ways_find_the_same_median() {
+    fn counting_and_selection_find_the_same_median() {
         let rows = rows();
         for device in [Device::flex(), Device::flex().autodiff()] {
             let tensor = |part: &dyn Fn(&Row) -> Vec<f32>| {

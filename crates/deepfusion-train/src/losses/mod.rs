@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn the_part_is_named_before_the_sum() {
+    fn a_non_finite_term_is_named_before_the_total() {
         let mut terms = LossTerms::default();
         assert_eq!(terms.not_finite(), None);
         terms.total = f64::NAN;

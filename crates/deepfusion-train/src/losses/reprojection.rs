@@ -165,7 +165,7 @@ mod tests {
     /// Four pixels and two sources, by hand. Seen by both: the smaller warped error, 0.4. Seen by the first alone: its 0.9, though the
     /// other's constant is 0.1. Seen by the second alone: 0.8. Seen by none: the smaller constant, 0.2.
     #[test]
-    fn a_source_that_does_not_see_a_pixel_has_no_part_in_it() {
+    fn a_source_that_does_not_see_a_pixel_is_ignored_there() {
         let device = Device::flex().autodiff();
         let row = |values: [f32; 4]| Tensor::<4>::from_data([[[values]]], &device);
         let errors = [[0.4, 0.9, 0.3, 0.3], [0.5, 0.3, 0.8, 0.3]].map(|e| row(e).require_grad());
@@ -197,7 +197,7 @@ mod tests {
 
     /// Of two samples the second lacks the better view: its loss is that of the first view alone, and only the first view has a gradient.
     #[test]
-    fn a_view_that_a_sample_lacks_wins_nowhere() {
+    fn a_missing_view_is_never_the_minimum() {
         let device = Device::flex().autodiff();
         let rows = |a: f32, b: f32| Tensor::<4>::from_data([[[[a]]], [[[b]]]], &device);
         let (in_time, beside) = (rows(0.4, 0.4).require_grad(), rows(0.1, 0.0).require_grad());
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pixel_that_moves_costs_the_constant_and_gives_no_gradient() {
+    fn dynamic_pixels_cost_the_constant_and_give_no_gradient() {
         let device = Device::flex().autodiff();
         let target = Tensor::<4>::random([1, 3, 8, 8], Distribution::Uniform(0.0, 1.0), &device);
         let image = Tensor::<4>::random([1, 3, 8, 8], Distribution::Uniform(0.0, 1.0), &device)

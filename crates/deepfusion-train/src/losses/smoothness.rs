@@ -20,7 +20,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_of_the_image_excuses_an_edge_of_the_disparity() {
+    fn a_disparity_edge_costs_less_at_an_image_edge() {
         let device = Device::flex();
         let step = |low: f32, high: f32| {
             let row = [low, low, low, high, high, high];

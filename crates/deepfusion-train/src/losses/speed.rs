@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unsure_distance_pulls_less() {
+    fn an_uncertain_distance_has_less_weight() {
         assert!((distance_weight(2.0, None) - 1.0).abs() < 1e-12);
         assert!((distance_weight(2.0, Some(0.0)) - 1.0).abs() < 1e-12);
         // 5 % gives a weight of a half, 15 % of a tenth.
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_costs_its_distance_and_ten_metres_a_radian() {
+    fn a_motion_costs_its_distance_and_ten_metres_per_radian() {
         let device = Device::flex();
         let of = |v: [f32; 3], t: [f32; 3]| {
             Motion::new(

@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_least_where_b_is_the_error() {
+    fn the_loss_is_smallest_where_b_is_the_error() {
         let device = Device::flex();
         let (truth, seen) = (truth(&device), seen(&device));
         let right = [0.1_f32, 0.2, 0.4, 0.8, 1.0, 1.0].map(f32::ln);

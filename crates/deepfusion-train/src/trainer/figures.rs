@@ -182,7 +182,7 @@ mod tests {
 
     /// Two steps that are read together: each of their batches gets its own numbers.
     #[test]
-    fn the_numbers_of_steps_go_where_they_belong() {
+    fn each_batch_of_several_steps_gets_its_own_numbers() {
         let steps = [step(3.0, true), step(f32::INFINITY, false), step(5.0, true)];
         let read = UnreadStep::read(&[&steps[0], &steps[1], &steps[2]]);
         for (index, at) in [(0, 3.0), (2, 5.0)] {

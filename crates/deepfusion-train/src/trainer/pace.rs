@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_known_leaves_a_mean_as_it_is() {
+    fn nan_does_not_change_a_mean() {
         let mut mean = Smoothed::new();
         mean.add(f64::NAN);
         assert!(mean.value().is_nan());

@@ -73,7 +73,7 @@ mod tests {
     use crate::Preset;
 
     #[test]
-    fn a_run_may_have_a_part_of_a_longer_schedule() {
+    fn a_run_may_use_part_of_a_longer_schedule() {
         let whole = TrainConfig {
             learning_rate: 1.0,
             learning_rate_schedule: LearningRateSchedule::Cosine,

@@ -173,9 +173,9 @@ impl Trainer {
         let mut control = Control::Continue;
         for ((step, unread), read) in waiting.into_iter().zip(read) {
             let figures = unread.figures(&read, share, step.number)?;
-            let said = (figures, read.outcome());
+            let outcome = (figures, read.outcome());
             // After a request to stop, steps that were already made are still reported.
-            if self.report_step(reports, step, said, seconds, listen)? == Control::Stop {
+            if self.report_step(reports, step, outcome, seconds, listen)? == Control::Stop {
                 control = Control::Stop;
             }
         }
@@ -235,7 +235,7 @@ mod tests {
 
     /// Ten steps are queued in no time. How long the device takes for them is known from earlier steps.
     #[test]
-    fn steps_that_wait_are_made_within_a_second() {
+    fn waiting_steps_take_at_most_a_second() {
         for (seconds, together) in [(0.01, MOST_UNDECIDED), (0.3, 4), (1.5, 1)] {
             let mut pace = Pace::new();
             // The first step compiles kernels.

@@ -92,7 +92,7 @@ impl Workers for OneOfTwo {
 
 /// Reading losses, monitors and norm in a single transfer at a step's end, as several workers do, gives the same as reading batch by batch.
 #[test]
-fn numbers_read_at_the_end_are_those_read_at_once() {
+fn numbers_read_late_equal_those_read_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let (drive, run) = (drive(folder.path()), |name: &str| folder.path().join(name));
     let (soon, transfers) = learned(&started(&drive, &run("soon"), false, |model| model));
@@ -135,7 +135,7 @@ fn damaged(mut model: Model) -> Model {
 
 /// A loss that is not finite is the same error, for the same batch, whenever it is read.
 #[test]
-fn a_loss_that_is_not_finite_is_named_either_way() {
+fn a_non_finite_loss_is_the_same_error_whenever_it_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let [soon, late] = [("soon", false), ("late", true)].map(|(name, reads_late)| {
@@ -229,7 +229,7 @@ fn weights(trainer: &Trainer) -> Vec<f64> {
 
 /// Numbers that are read every few steps, and the weights, are the same as with a read after each step.
 #[test]
-fn a_run_that_is_read_now_and_then_is_the_same() {
+fn reading_every_few_steps_does_not_change_a_run() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let run = |read_every: Option<usize>| {
@@ -284,7 +284,7 @@ fn by_hand(
 
 /// A NaN gradient skips only its own step, and Adam does not count it.
 #[test]
-fn a_gradient_that_is_not_finite_skips_one_step() {
+fn a_non_finite_gradient_skips_one_step() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let run = |read_every: Option<usize>| {
@@ -332,7 +332,7 @@ fn a_gradient_that_is_not_finite_skips_one_step() {
 /// A NaN loss ends the run when it is read, with an error that names its step. That step was not made, and the steps before it are
 /// reported.
 #[test]
-fn a_loss_that_is_not_finite_is_found_late() {
+fn a_non_finite_loss_ends_the_run_when_it_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let (mut trainer, mut reported) = (
@@ -362,7 +362,7 @@ fn a_loss_that_is_not_finite_is_found_late() {
 
 /// A checkpoint waits for the numbers of the steps before it, and is not written after a NaN loss.
 #[test]
-fn nothing_is_saved_after_a_loss_that_is_not_finite() {
+fn nothing_is_saved_after_a_non_finite_loss() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let undamaged: fn(Model) -> Model = |model| model;
@@ -392,7 +392,7 @@ fn nothing_is_saved_after_a_loss_that_is_not_finite() {
 
 /// A run that is stopped reports all steps that were made, and its checkpoint is that of the last.
 #[test]
-fn a_run_stops_with_the_steps_that_were_made() {
+fn a_stopped_run_reports_and_saves_all_steps_made() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let mut trainer = run_of(9, &drive, &folder.path().join("run"), Some(4));
@@ -420,7 +420,7 @@ fn a_run_stops_with_the_steps_that_were_made() {
 
 /// A run that was stopped resumes with Adam's moments and step count, and ends with the same weights as an uninterrupted run.
 #[test]
-fn a_run_resumes_with_the_steps_that_were_made() {
+fn a_resumed_run_equals_an_uninterrupted_one() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let mut whole = run_of(6, &drive, &folder.path().join("whole"), Some(4));
@@ -447,7 +447,7 @@ fn a_run_resumes_with_the_steps_that_were_made() {
 
 /// The first steps are read one by one; later ones after a certain time at the latest.
 #[test]
-fn steps_are_read_when_it_is_time() {
+fn steps_are_read_at_the_read_interval() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     for (interval, expected) in [

@@ -68,12 +68,12 @@ impl Dataset {
     /// turns are missing for a tenth of the pairs that moved, because a yaw with gaps is of no use.
     pub fn take_turns(&mut self, turns: &[SeenTurn]) {
         let yaw_known = self.parts.yaw_known;
-        let enough = yaw_known || self.shows_enough(turns);
+        let enough = yaw_known || self.has_enough(turns);
         if !self.tilt_unknown() || turns.is_empty() || !enough {
             return;
         }
         let track = self.parts.track.take();
-        self.parts.track = track.map(|track| seen_turn::put_into(track, turns, yaw_known));
+        self.parts.track = track.map(|track| seen_turn::with_turns(track, turns, yaw_known));
         self.parts.yaw_known = true;
         self.warnings.retain(|warning| {
             !matches!(
@@ -84,12 +84,12 @@ impl Dataset {
             )
         });
         let images = self.frames().len();
-        let taken = seen_turn::warning(turns, images, yaw_known);
-        self.warnings.push(taken.into());
+        let warning = seen_turn::warning(turns, images, yaw_known);
+        self.warnings.push(warning.into());
     }
 
     /// Whether there are turns for at least nine tenths of the neighbouring pairs in which the vehicle moved.
-    fn shows_enough(&self, turns: &[SeenTurn]) -> bool {
+    fn has_enough(&self, turns: &[SeenTurn]) -> bool {
         /// Below this speed the vehicle counts as standing still, m/s.
         const STANDING: f64 = 0.5;
         let Ok(ego) = self.ego() else { return false };

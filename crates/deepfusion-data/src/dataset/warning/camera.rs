@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_says_the_camera_is_named() {
+    fn messages_name_the_source_of_the_camera() {
         let by_exif = |action_camera, turned| CameraWarning::ByExif {
             image: "drive/images/000.jpg".into(),
             by: "26 mm in 35 mm film".into(),
@@ -126,17 +126,17 @@ mod tests {
             action_camera,
             turned,
         };
-        let taken = "the camera is taken from EXIF in 000.jpg: 26 mm in 35 mm film, so fx = fy = 3004.6, with a centred principal point; a \
+        let from_exif = "the camera is taken from EXIF in 000.jpg: 26 mm in 35 mm film, so fx = fy = 3004.6, with a centred principal point; a \
                      calibration is better";
-        assert_eq!(by_exif(false, false).to_string(), taken);
-        let said = by_exif(true, true).to_string();
-        let more = said.strip_prefix(taken).unwrap();
+        assert_eq!(by_exif(false, false).to_string(), from_exif);
+        let message = by_exif(true, true).to_string();
+        let more = message.strip_prefix(from_exif).unwrap();
         assert_eq!(
             more,
             "; an action camera's wide lens bends lines, unlike a pinhole camera: use its linear lens, or calibrate it as a \
              fisheye lens; the images are used as stored, without the rotation in EXIF"
         );
-        for (warning, said) in [
+        for (warning, expected) in [
             (
                 CameraWarning::Assumed {
                     fx: 920.04,
@@ -170,22 +170,22 @@ mod tests {
                 "fx is 0, expected a focal length above 0",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), expected);
         }
     }
 
     #[test]
     fn a_calibration_without_a_size_is_named_by_its_file() {
-        let said = |by| {
+        let message = |by| {
             let (width, height) = (1242, 375);
             CameraWarning::SizeUnknown { by, width, height }.to_string()
         };
         assert_eq!(
-            said(CalibrationSource::File("drive/intrinsics.txt".into())),
+            message(CalibrationSource::File("drive/intrinsics.txt".into())),
             "intrinsics.txt: no image size is given, assuming the images' 1242x375"
         );
         assert_eq!(
-            said(CalibrationSource::Given),
+            message(CalibrationSource::Given),
             "given intrinsics: no image size is given, assuming the images' 1242x375"
         );
     }

@@ -81,9 +81,12 @@ fn of_camera(camera: Option<u8>) -> String {
 
 fn passed_over(folder: &Path, layout: DatasetKind, recordings: &[String]) -> String {
     /// How many names are listed.
-    const MOST: usize = 6;
-    let said = recordings.get(..MOST).unwrap_or(recordings).join(", ");
-    let more = match recordings.len().checked_sub(MOST) {
+    const MAX_LISTED: usize = 6;
+    let listed = recordings
+        .get(..MAX_LISTED)
+        .unwrap_or(recordings)
+        .join(", ");
+    let more = match recordings.len().checked_sub(MAX_LISTED) {
         None | Some(0) => String::new(),
         Some(more) => format!(" and {more} more"),
     };
@@ -93,7 +96,7 @@ fn passed_over(folder: &Path, layout: DatasetKind, recordings: &[String]) -> Str
         ("look like recordings and are", "each")
     };
     format!(
-        "{} is read only as {}; {said}{more} in it {are} not read (give {each} by its own path)",
+        "{} is read only as {}; {listed}{more} in it {are} not read (give {each} by its own path)",
         folder.display(),
         with_article(layout)
     )
@@ -137,8 +140,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_passed_over_is_named_as_far_as_there_is_room() {
-        let said = |count| {
+    fn recordings_that_are_passed_over_are_listed_up_to_a_limit() {
+        let message = |count| {
             let passed_over = IncompleteWarning::PassedOver {
                 folder: "drives".into(),
                 layout: DatasetKind::Folder,
@@ -147,19 +150,19 @@ mod tests {
             passed_over.to_string()
         };
         assert_eq!(
-            said(1),
+            message(1),
             "drives is read only as an image folder; drive1.bag in it looks like a recording and is not read (give it by its own path)"
         );
         let these = "drives is read only as an image folder; drive1.bag, drive2.bag";
         let each = "in it look like recordings and are not read (give each by its own path)";
-        assert_eq!(said(2), format!("{these} {each}"));
+        assert_eq!(message(2), format!("{these} {each}"));
         let six = format!("{these}, drive3.bag, drive4.bag, drive5.bag, drive6.bag");
-        assert_eq!(said(6), format!("{six} {each}"));
-        assert_eq!(said(8), format!("{six} and 2 more {each}"));
+        assert_eq!(message(6), format!("{six} {each}"));
+        assert_eq!(message(8), format!("{six} and 2 more {each}"));
     }
 
     #[test]
-    fn what_is_missing_is_counted() {
+    fn messages_count_what_is_missing() {
         let no_images = |camera| IncompleteWarning::NoImages {
             camera,
             recordings: names(2),
@@ -172,7 +175,7 @@ mod tests {
             parts,
             first: "drive.bag: the chunk at byte 7 is too short".into(),
         };
-        for (warning, said) in [
+        for (warning, expected) in [
             (
                 no_images(None),
                 "left out for lack of images: drive1.bag, drive2.bag",
@@ -221,7 +224,7 @@ mod tests {
                 "2 messages or chunks cannot be read; the first: drive.bag: the chunk at byte 7 is too short",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), expected);
         }
     }
 }

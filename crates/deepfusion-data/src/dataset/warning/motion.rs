@@ -213,10 +213,10 @@ mod tests {
     use deepfusion_logs::TableNote;
 
     #[test]
-    fn what_is_said_of_speeds() {
+    fn messages_about_speeds() {
         let log = || "speed.csv".to_owned();
         let topic = || "/gnss/fix".to_owned();
-        for (warning, said) in [
+        for (warning, expected) in [
             (
                 MotionWarning::FramesWithoutSpeed { frames: 3, of: 12 },
                 "no speed was measured around the time of 3 of 12 frames",
@@ -298,12 +298,12 @@ mod tests {
                 "/gnss/fix: its velocities are in world axes: using their length as forward speed",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), expected);
         }
     }
 
     #[test]
-    fn what_is_said_of_turns() {
+    fn messages_about_turns() {
         let turns = |yaw_recorded, seen| MotionWarning::TurnsOfImages {
             yaw_recorded,
             seen,
@@ -314,7 +314,7 @@ mod tests {
             key: "can.speed",
             id,
         };
-        for (warning, said) in [
+        for (warning, expected) in [
             (
                 MotionWarning::NoYawRate {
                     log: "speed.csv".into(),
@@ -358,7 +358,7 @@ mod tests {
                 "can.speed: no CAN frame 0x18f0090b (29 bits) has a value of it",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), expected);
         }
     }
 }

@@ -145,13 +145,13 @@ mod tests {
     use nalgebra::Vector2;
 
     #[test]
-    fn a_mount_that_is_not_given_is_said_to_be_taken() {
+    fn messages_about_assumed_mounts() {
         let heading = Heading {
             off: Vector2::new(2_f64.to_radians(), (-1_f64).to_radians()),
             std_error: Vector2::new(0.002, 0.001),
         };
         let broken = |transforms| MountWarning::BrokenTransforms { transforms };
-        for (warning, said) in [
+        for (warning, expected) in [
             (
                 MountWarning::NotGiven,
                 "the camera's mount is not given ([mount] in dataset.toml): assuming that it looks straight ahead from the vehicle's origin",
@@ -196,15 +196,15 @@ mod tests {
                 "cam_from_vehicle: drive.toml and frames base_link → camera are 0.400 m and 0.00° apart; the former is used",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), expected);
         }
     }
 
     #[test]
-    fn why_the_frames_do_not_say_a_mount_is_said() {
+    fn messages_say_why_frames_give_no_mount() {
         let config = PathBuf::from("drive.toml");
         let (from, to) = ("base_link".to_owned(), "camera".to_owned());
-        for (why, said) in [
+        for (why, expected) in [
             (
                 NotByFrames::NoVehicle {
                     frames: vec!["camera".into(), "chassis".into()],
@@ -240,7 +240,7 @@ mod tests {
         ] {
             let mount = "cam_from_vehicle";
             let warning = MountWarning::NotByFrames { mount, why };
-            assert_eq!(warning.to_string(), format!("{mount}: {said}"));
+            assert_eq!(warning.to_string(), format!("{mount}: {expected}"));
         }
     }
 }

@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_times() {
+    fn messages_about_times() {
         let repeated = |rows| TimesWarning::Repeated {
             table: "speed.csv".into(),
             rows,
@@ -145,7 +145,7 @@ mod tests {
             topic: "/imu".into(),
             messages,
         };
-        for (warning, said) in [
+        for (warning, expected) in [
             (
                 TimesWarning::ImagesUntimed,
                 "the images have no times: no frames.csv, no timestamps.txt, no fps in dataset.toml",
@@ -223,7 +223,7 @@ mod tests {
                 "/imu: 25 messages have no time in their headers; using the time of recording, which is later by the transport delay",
             ),
         ] {
-            assert_eq!(warning.to_string(), said);
+            assert_eq!(warning.to_string(), expected);
         }
     }
 }

@@ -139,7 +139,7 @@ fn of_camera_info(
 ) -> std::result::Result<(Intrinsics, Distortion), CameraInfoProblem> {
     let size = match (info.width, info.height) {
         (0, 0) => image_size,
-        said => said,
+        stated => stated,
     };
     let of = |fx, fy, cx, cy| Intrinsics::from_numbers([fx, fy, cx, cy], size);
     if rectified && info.p[0] > 0.0 {
@@ -171,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rectified_is_a_word_of_the_topics_name() {
+    fn rectified_images_are_recognised_by_their_topic() {
         for topic in [
             "/camera/image_rect",
             "/camera/image_rect_color/compressed",
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn the_model_says_what_the_coefficients_are() {
+    fn the_distortion_model_determines_the_coefficients() {
         let d = [0.1, -0.02, 0.003, -0.0004];
         let k = Intrinsics::from_numbers([40.0, 41.0, 31.5, 23.5], (64, 48));
         let by = |distortion| Lens::new(k, &distortion).unwrap().intrinsics();

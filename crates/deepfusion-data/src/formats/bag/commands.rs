@@ -1,6 +1,6 @@
 //! Recognises topics with commands to a vehicle instead of measurements: ROS 2's controllers publish both with the same message type.
 
-/// Words in the names of such topics.
+/// Words in the names of topics with commands.
 const WORDS: [&str; 7] = [
     "cmd", "command", "commands", "setpoint", "target", "teleop", "joy",
 ];
@@ -19,7 +19,7 @@ mod tests {
     use super::is_command;
 
     #[test]
-    fn a_command_is_known_by_the_words_of_its_name() {
+    fn commands_are_recognised_by_words_in_their_names() {
         for name in [
             "/diff_drive_controller/cmd_vel",
             "/ackermann_cmd",

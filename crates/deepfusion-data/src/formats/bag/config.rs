@@ -11,7 +11,7 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Name of the file for every bag in a folder that has no file of its own.
-const OF_FOLDER: &str = "bag.toml";
+const FOR_FOLDER: &str = "bag.toml";
 
 /// All settings. Every key is optional; docs/reference/bag-toml.md explains them.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -215,7 +215,7 @@ impl Default for ClockConfig {
 }
 
 /// Whether the file beside a bag marks the bag as simulated; false if the file cannot be read.
-pub(crate) fn says_simulated(bag: &Path) -> bool {
+pub(crate) fn marked_as_simulated(bag: &Path) -> bool {
     BagConfig::of(bag, &OpenOptions::default()).is_ok_and(|config| config.simulated == Some(true))
 }
 
@@ -268,7 +268,7 @@ impl BagConfig {
         let mut config: Self = crate::dataset_toml::read_or_default(&path)?;
         if let Some(name) = &config.profile {
             let own = crate::dataset_toml::read_or_default(&path)?;
-            if let Some(filled) = Self::over_profile(own, name) {
+            if let Some(filled) = Self::with_profile(own, name) {
                 config = filled.map_err(|e| Error::Config {
                     path: path.clone(),
                     problem: e.into(),
@@ -284,7 +284,7 @@ impl BagConfig {
     ///
     /// # Errors
     /// If the result is not a valid configuration.
-    pub(super) fn over_profile(
+    pub(super) fn with_profile(
         own: toml::Table,
         name: &str,
     ) -> Option<std::result::Result<Self, toml::de::Error>> {
@@ -299,14 +299,14 @@ impl BagConfig {
 
     /// Paths at which a bag's file is looked for, in this order.
     pub(super) fn candidates(bag: &Path) -> Vec<PathBuf> {
-        let shared = bag.with_file_name(OF_FOLDER);
+        let shared = bag.with_file_name(FOR_FOLDER);
         if !bag.is_dir() {
             return vec![bag.with_extension("toml"), shared];
         }
         // A ROS 2 bag is a folder: the file is in it, beside it under its full name, or for all bags of the folder above.
         let mut own = bag.as_os_str().to_owned();
         own.push(".toml");
-        vec![bag.join(OF_FOLDER), PathBuf::from(own), shared]
+        vec![bag.join(FOR_FOLDER), PathBuf::from(own), shared]
     }
 
     fn validate(&self) -> Result<()> {

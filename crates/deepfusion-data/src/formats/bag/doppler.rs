@@ -13,9 +13,9 @@ const INLIER_MPS: f64 = 0.3;
 /// Rounds of reweighting.
 const ROUNDS: usize = 12;
 /// Fewest points for an estimate.
-const LEAST_POINTS: usize = 30;
+const MIN_POINTS: usize = 30;
 /// Most points used: all 10⁵ points of a scan give no better estimate than every tenth.
-const ENOUGH_POINTS: usize = 8000;
+const MAX_POINTS: usize = 8000;
 
 /// The sensor's own velocity, estimated from its scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +42,7 @@ pub fn ego_velocity(
     radial: &[f32],
     start: Option<Vector3<f64>>,
 ) -> Option<DopplerEgo> {
-    let step = (xyz.len() / ENOUGH_POINTS).max(1);
+    let step = (xyz.len() / MAX_POINTS).max(1);
     let rays: Vec<(Vector3<f64>, f64)> = xyz
         .iter()
         .zip(radial)
@@ -50,7 +50,7 @@ pub fn ego_velocity(
         .filter_map(|(point, radial)| ray(point).map(|d| (d, f64::from(*radial))))
         .filter(|(_, radial)| radial.is_finite())
         .collect();
-    if rays.len() < LEAST_POINTS {
+    if rays.len() < MIN_POINTS {
         return None;
     }
     let prior = start.unwrap_or_default();
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sensor_s_velocity_comes_from_what_stands_still() {
+    fn the_sensors_velocity_is_estimated_from_static_points() {
         let truth = Vector3::new(9.0, -0.4, 0.05);
         for moving in [0.0, 0.2, 0.4] {
             let (xyz, radial) = scan(truth, moving);
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_made_of_nothing() {
+    fn too_few_or_invalid_points_give_no_velocity() {
         assert!(ego_velocity(&[], &[], None).is_none());
         let (xyz, _) = scan(Vector3::x(), 0.0);
         assert!(ego_velocity(&xyz, &vec![f32::NAN; xyz.len()], None).is_none());

@@ -8,9 +8,9 @@ use deepfusion_rosbag::MessageSource;
 use nalgebra::Vector3;
 
 /// Largest distance between a listed point and the matching point of the scan, metres: a driver may round.
-const APART_M: f32 = 0.01;
+const MAX_DISTANCE_M: f32 = 0.01;
 /// Smallest fraction of the listed points that must be in the scan; otherwise the list belongs to another scan or has other axes.
-const LEAST_FOUND: f64 = 0.5;
+const MIN_FOUND: f64 = 0.5;
 
 /// The positions of the topic's messages.
 #[derive(Debug)]
@@ -66,13 +66,13 @@ impl MatchedPoints {
         };
         for point in listed.iter().filter(|point| usable(point)) {
             found.points += 1;
-            let first = by_x.partition_point(|i| xyz[*i][0] < point[0] - APART_M);
+            let first = by_x.partition_point(|i| xyz[*i][0] < point[0] - MAX_DISTANCE_M);
             let near = by_x[first..]
                 .iter()
-                .take_while(|i| xyz[**i][0] <= point[0] + APART_M);
+                .take_while(|i| xyz[**i][0] <= point[0] + MAX_DISTANCE_M);
             let apart = |i: &usize| (Vector3::from(xyz[*i]) - Vector3::from(*point)).norm();
             let nearest = near.min_by(|a, b| apart(a).total_cmp(&apart(b)));
-            if let Some(i) = nearest.filter(|i| apart(i) <= APART_M) {
+            if let Some(i) = nearest.filter(|i| apart(i) <= MAX_DISTANCE_M) {
                 found.moves[*i] = true;
                 found.found += 1;
             }
@@ -81,8 +81,8 @@ impl MatchedPoints {
     }
 
     /// Whether the list belongs to this scan. An empty list does: nothing moves.
-    pub(super) fn is_of_scan(&self) -> bool {
-        self.found as f64 >= LEAST_FOUND * self.points as f64
+    pub(super) fn belongs_to_scan(&self) -> bool {
+        self.found as f64 >= MIN_FOUND * self.points as f64
     }
 }
 
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_listed_point_is_the_nearest_within_a_centimetre() {
+    fn listed_points_match_the_nearest_within_a_centimetre() {
         let scan = [
             [5.0, 1.0, 0.0],
             [5.004, 1.0, 0.0],
@@ -109,13 +109,13 @@ mod tests {
         let found = MatchedPoints::find(&scan, &listed);
         assert_eq!(found.moves, [false, true, true, false, false]);
         assert_eq!((found.points, found.found), (3, 2));
-        assert!(found.is_of_scan());
+        assert!(found.belongs_to_scan());
     }
 
     #[test]
-    fn a_list_in_other_axes_is_of_no_scan() {
+    fn a_list_in_other_axes_matches_no_scan() {
         let scan = [[5.0, 1.0, 0.0], [6.0, 1.0, 0.0]];
-        assert!(!MatchedPoints::find(&scan, &[[1.0, 5.0, 0.0], [1.0, 6.0, 0.0]]).is_of_scan());
-        assert!(MatchedPoints::find(&scan, &[]).is_of_scan());
+        assert!(!MatchedPoints::find(&scan, &[[1.0, 5.0, 0.0], [1.0, 6.0, 0.0]]).belongs_to_scan());
+        assert!(MatchedPoints::find(&scan, &[]).belongs_to_scan());
     }
 }

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_position_is_left_out_and_gaps_are_bridged() {
+    fn invalid_positions_are_left_out_and_gaps_are_bridged() {
         let mut fixes = Fixes::default();
         for second in 0..20_i64 {
             // 10 m/s; without a position the receiver gives the origin, and once a number is missing.
@@ -160,13 +160,13 @@ mod tests {
         assert_eq!(steps.max(), Some(250_000_000), "3 s are bridged too");
         let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         let warnings = warnings.join("\n");
-        for said in [
+        for part in [
             "2 of 20 messages left out for lack of a position",
             "median standard deviation 0.",
             "vehicle.max_gap_s",
             "up to 3.0 s",
         ] {
-            assert!(warnings.contains(said), "{said}: {warnings}");
+            assert!(warnings.contains(part), "{part}: {warnings}");
         }
         // Not across longer gaps than allowed.
         let speeds = fixes.speeds("/fix", Some(2.0), &mut Vec::new()).speeds_mps;
@@ -178,7 +178,7 @@ mod tests {
         let mut warnings = Vec::new();
         let found = lone.speeds("/fix", None, &mut warnings);
         assert!(found.speeds_mps.is_empty() && found.sigmas_mps.is_none());
-        let said = warnings[0].to_string();
-        assert!(said.contains("at least two"), "{said}");
+        let message = warnings[0].to_string();
+        assert!(message.contains("at least two"), "{message}");
     }
 }

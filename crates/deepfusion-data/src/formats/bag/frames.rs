@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 const SAME_M: f64 = 0.01;
 const SAME_RAD: f64 = 0.0087;
 /// Most paths between two frames that are compared.
-const MOST_WAYS: usize = 16;
+const MAX_CHAINS: usize = 16;
 
 /// All transforms of a bag.
 #[derive(Debug, Clone, Default)]
@@ -144,7 +144,7 @@ impl Frames {
         if !(self.has(target) && self.has(source)) {
             return Lookup::Unknown;
         }
-        let mut fixed = self.ways(target, source, true);
+        let mut fixed = self.chains(target, source, true);
         fixed.sort_by_key(|chain| chain.names.len());
         if let Some(first) = fixed.first() {
             let other = fixed.iter().find(|other| {
@@ -155,7 +155,7 @@ impl Frames {
                 None => Lookup::Fixed(first.clone()),
             };
         }
-        let moving = self.ways(target, source, false);
+        let moving = self.chains(target, source, false);
         let links = moving.first().into_iter().flat_map(|chain| {
             chain.names.windows(2).filter_map(|pair| {
                 let link = self.link(&pair[0], &pair[1])?;
@@ -178,7 +178,7 @@ impl Frames {
     }
 
     /// The chains without repeated frames, over constant links only or over all links.
-    fn ways(&self, target: &str, source: &str, only_fixed: bool) -> Vec<Chain> {
+    fn chains(&self, target: &str, source: &str, only_fixed: bool) -> Vec<Chain> {
         // Depth first. In a tree there is one chain, so every frame is visited once.
         let mut open = vec![Chain {
             names: vec![source.to_owned()],
@@ -190,7 +190,7 @@ impl Frames {
             let here = chain.names.last().map_or("", String::as_str);
             if here == target {
                 found.push(chain);
-                if found.len() == MOST_WAYS {
+                if found.len() == MAX_CHAINS {
                     break;
                 }
                 continue;
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_goes_up_and_down() {
+    fn chains_go_through_common_parents() {
         let quarter = std::f64::consts::FRAC_PI_2;
         let tree = frames(&[
             link("base", "/mast", 1.0, quarter),
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_is_no_mount() {
+    fn moving_frames_are_not_a_mount() {
         let tree = frames(&[
             link("odom", "base", 0.0, 0.0),
             link("base", "pan", 1.0, 0.0),

@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mosaic_that_was_compressed_as_it_is_has_colours() {
+    fn compressed_bayer_images_are_demosaiced() {
         let colour = [200_u8, 90, 7].repeat(16);
         assert_eq!(of_format("bayer_rggb8; jpeg compressed ").as_raw(), &colour);
         assert_eq!(of_format("bayer_rggb8; png compressed").as_raw(), &colour);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn bayer_patterns_yuv_and_sixteen_bits_are_pictures() {
+    fn bayer_yuv_and_sixteen_bit_images_are_decoded() {
         for encoding in ["bayer_grbg8", "mono16", "mono8"] {
             let grey = picture(encoding).unwrap();
             assert_eq!(grey.as_raw(), &[128; 12], "{encoding}");
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn the_hint_of_an_encoding_that_is_not_read_lists_those_that_are() {
+    fn the_hint_about_an_unsupported_encoding_lists_the_supported_ones() {
         let error = picture("nv12").unwrap_err();
         let text = error.to_string();
         assert!(text.contains("/camera") && text.contains("nv12"), "{text}");

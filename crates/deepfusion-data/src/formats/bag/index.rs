@@ -74,7 +74,7 @@ pub(super) struct Index {
     pub(super) steering_rad: Vec<(i64, f64)>,
     pub(super) imu: Vec<(i64, ImuSample)>,
     /// Whether a message of the inertial unit marks its rates as missing.
-    rates_denied: bool,
+    rates_marked_missing: bool,
     /// `world_from_vehicle`, exact.
     pub(super) truth: Vec<(i64, Se3)>,
     /// The transforms between frames.
@@ -98,7 +98,7 @@ pub(super) struct Index {
 
 impl Index {
     /// Whether the messages with the speed have a yaw rate. Publishers without one write zeros or NaN. Poses always give one.
-    pub(super) fn says_turns(&self) -> bool {
+    pub(super) fn has_yaw_rates(&self) -> bool {
         let turns = |rate: f64| rate.is_finite() && rate != 0.0;
         !self.tilts_rad.is_empty() || self.yaw_rate.iter().any(|(_, rate)| turns(*rate))
     }
@@ -223,7 +223,7 @@ impl Index {
         let Some((_, first)) = self.imu.first() else {
             return;
         };
-        let idle = if self.rates_denied {
+        let idle = if self.rates_marked_missing {
             first.angular_rate_radps
         } else {
             Vector3::zeros()
@@ -256,7 +256,7 @@ impl Index {
         config: &BagConfig,
         can: &Can,
     ) -> Result<()> {
-        if topics.holds_frames(message.topic()) {
+        if topics.has_frames(message.topic()) {
             return self.add_frames(message);
         }
         let at_ns = stamp(message);
@@ -293,7 +293,7 @@ impl Index {
                 TopicRole::Imu => {
                     let imu: Imu = message.decode()?;
                     // By the message's definition, there are no angular rates then; but some drivers write this with valid rates.
-                    self.rates_denied |= imu.angular_velocity_covariance[0] == -1.0;
+                    self.rates_marked_missing |= imu.angular_velocity_covariance[0] == -1.0;
                     let (a, w) = (imu.linear_acceleration, imu.angular_velocity);
                     let sample = ImuSample {
                         time_s: 0.0,
@@ -332,9 +332,9 @@ impl Index {
                 }
                 TopicRole::Can => {
                     let frame: Frame = message.decode()?;
-                    let said = can.read(&frame, at_ns);
-                    self.speed_mps.extend(said.speed_mps);
-                    self.steering_rad.extend(said.steering_rad);
+                    let values = can.read(&frame, at_ns);
+                    self.speed_mps.extend(values.speed_mps);
+                    self.steering_rad.extend(values.steering_rad);
                 }
                 TopicRole::Truth => {
                     let odometry: Odometry = message.decode()?;

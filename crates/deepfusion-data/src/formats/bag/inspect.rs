@@ -104,7 +104,7 @@ fn turn(
 /// Yaw rates in rad/s, from the speed's messages if they have any (not every publisher fills them in), otherwise from the
 /// inertial unit, whose z is up unless the file beside the bag, or its frames, rotate it.
 fn yaw_rates(index: &Index, vehicle_from_imu: Option<&Se3>) -> Vec<(i64, f64)> {
-    if index.says_turns() {
+    if index.has_yaw_rates() {
         return index.yaw_rate.clone();
     }
     let rates = index.imu.iter().map(|(ns, sample)| {

@@ -41,7 +41,7 @@ mod video;
 mod world_axes;
 mod write_config;
 
-pub(crate) use config::says_simulated;
+pub(crate) use config::marked_as_simulated;
 pub use doppler::{DopplerEgo, ego_velocity, ground_radial};
 pub(crate) use frames::Change;
 pub(crate) use inspect::without_images;

@@ -34,7 +34,7 @@ pub(super) struct Mounts {
     /// `None` if unknown.
     pub(super) vehicle_from_imu: Option<Se3>,
     /// All known mounts, with their sources.
-    pub(super) said: Vec<Mount>,
+    pub(super) known: Vec<Mount>,
 }
 
 impl Mounts {
@@ -97,7 +97,7 @@ impl Mounts {
             cam_from_vehicle: cam_from_vehicle.unwrap_or_else(Se3::cam_from_body_axes),
             cam_from_lidar,
             vehicle_from_imu,
-            said: search.mounts,
+            known: search.mounts,
         })
     }
 }
@@ -137,8 +137,8 @@ impl Search<'_> {
             }
             (None, MountByFrames::Found(by_frames, chain)) => {
                 if let Some(profile) = profile {
-                    let who = format!("the profile {of_profile}");
-                    self.compare(name, (&by_frames, &chain), (&profile, &who));
+                    let source = format!("the profile {of_profile}");
+                    self.compare(name, (&by_frames, &chain), (&profile, &source));
                 }
                 (by_frames, chain)
             }

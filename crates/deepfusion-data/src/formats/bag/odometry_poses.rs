@@ -10,7 +10,7 @@ use std::path::Path;
 /// Distance over which a direction of travel is determined, in metres. If the poses never move this far, the vehicle stands still.
 const STEP_M: f64 = 1.0;
 /// Least mean cosine of the angle between the poses' x axis and the direction of travel: beyond 26°, x is not the vehicle's forward axis.
-const ALONG: f64 = 0.9;
+const MIN_COSINE: f64 = 0.9;
 
 /// The vehicle's motion according to poses.
 pub(super) enum PoseMotion {
@@ -48,7 +48,7 @@ pub(super) fn motion_of(bag: &Path, mut poses: Vec<(i64, Se3)>) -> PoseMotion {
     poses.sort_by_key(|(ns, _)| *ns);
     match along(&poses) {
         None => PoseMotion::Standing,
-        Some(along) if along < ALONG => PoseMotion::OtherAxes,
+        Some(along) if along < MIN_COSINE => PoseMotion::OtherAxes,
         Some(_) => PoseMotion::Moving(Box::new(speed_log(bag, &poses))),
     }
 }
@@ -59,13 +59,13 @@ fn along(poses: &[(i64, Se3)]) -> Option<f64> {
     let (mut sum, mut steps) = (0.0, 0_u32);
     for (_, pose) in poses {
         let moved = pose.translation() - from.translation();
-        let way_m = moved.norm();
-        if way_m < STEP_M {
+        let path_m = moved.norm();
+        if path_m < STEP_M {
             continue;
         }
         // The chord of an arc has the direction halfway between both attitudes.
         let ahead = from.interpolate(pose, 0.5).rotate(&Vector3::x());
-        sum += ahead.dot(&moved).abs() / way_m;
+        sum += ahead.dot(&moved).abs() / path_m;
         steps += 1;
         from = *pose;
     }
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_that_go_along_their_x_are_a_drive() {
+    fn poses_give_speeds_only_if_their_x_points_along_the_path() {
         let path = Path::new("drive.bag");
         // To the north, with the x axis pointing north; the last pose has no orientation.
         let mut north = poses([0.0, 1.0, 0.0], [0.0, 0.0, 1.57]);

@@ -150,7 +150,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         images: index.images,
         video,
         lens,
-        mounts: mounts.said,
+        mounts: mounts.known,
         damage,
         warnings,
         cam_from_vehicle,
@@ -199,8 +199,8 @@ struct Clock {
 
 impl Clock {
     fn from_image(first: &MessageRef, config: &BagConfig, options: &OpenOptions) -> Self {
-        let said = options.camera_ahead_s;
-        let camera_ahead_s = said.unwrap_or(config.clock.camera_ahead_s);
+        let given = options.camera_ahead_s;
+        let camera_ahead_s = given.unwrap_or(config.clock.camera_ahead_s);
         Self {
             origin_ns: on_the_vehicles_clock(first.stamp_ns, camera_ahead_s),
             camera_ahead_s,

@@ -4,7 +4,7 @@ use crate::logs::clock::{TimeUnit, seconds};
 use deepfusion_rosbag::msg::{Column, Datatype};
 
 /// Largest time between a point and its scan, in seconds.
-const FARTHEST_S: f64 = 1.0;
+const MAX_AFTER_S: f64 = 1.0;
 
 /// The points' times in seconds after the scan's own time, which is `scan_ns` after 1970. The numbers may be dates in any unit, or count
 /// from the scan's time: integers in nanoseconds, like Ouster's `t`, others in seconds, like Velodyne's `time`. Points that are invalid
@@ -33,7 +33,7 @@ pub(super) fn seconds_after(
         }
     });
     let after: Vec<f64> = after.collect();
-    let is_near = after.iter().all(|s| s.abs() <= FARTHEST_S);
+    let is_near = after.iter().all(|s| s.abs() <= MAX_AFTER_S);
     is_near.then(|| after.iter().map(|s| *s as f32).collect())
 }
 
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn times_of_points_as_drivers_write_them() {
+    fn point_times_are_read_in_the_units_of_drivers() {
         let near = |found: Option<Vec<f32>>, expected: [f32; 2]| {
             let found = found.unwrap();
             let is_near = |(a, b): (&f32, &f32)| (a - b).abs() < 1e-6;
@@ -90,7 +90,7 @@ mod tests {
 
     /// Many drivers fill invalid points with zeros, even if the others have dates.
     #[test]
-    fn rays_without_an_echo_need_no_times() {
+    fn invalid_points_need_no_times() {
         let numbers = [0.0, f64::INFINITY, 1_700_000_000.55, f64::NAN];
         let bytes = numbers.map(|number: f64| number.to_le_bytes().to_vec());
         let found = after(Datatype::Float64, &bytes, 2).unwrap();

@@ -4,12 +4,12 @@ use nalgebra::Vector3;
 
 fn umad(own: &str) -> BagConfig {
     let own = toml::from_str(own).unwrap();
-    BagConfig::over_profile(own, "umad").unwrap().unwrap()
+    BagConfig::with_profile(own, "umad").unwrap().unwrap()
 }
 
 /// Each profile is a valid file beside a bag, and names no files.
 #[test]
-fn profiles_are_files_as_those_beside_bags() {
+fn profiles_are_valid_bag_configurations() {
     for (name, text) in PROFILES {
         let config: BagConfig = toml::from_str(text).unwrap();
         assert!(
@@ -21,7 +21,7 @@ fn profiles_are_files_as_those_beside_bags() {
 }
 
 #[test]
-fn ahead_of_the_lidar_is_ahead_of_the_camera() {
+fn umads_lidar_mount_has_the_right_axes() {
     let config = umad("");
     assert!(config.cam_from_lidar.is_none());
     let cam_from_lidar = config.profile_mounts.cam_from_lidar.unwrap().se3();
@@ -31,7 +31,7 @@ fn ahead_of_the_lidar_is_ahead_of_the_camera() {
 }
 
 #[test]
-fn what_the_bags_file_says_goes_before_it() {
+fn the_bags_file_takes_precedence_over_the_profile() {
     let config =
         umad("[cam_from_lidar]\ntranslation = [0.0, 0.1, 0.0]\nrotation = [0.0, 0.0, 0.0]\n");
     assert_eq!(config.cam_from_lidar.unwrap().translation, [0.0, 0.1, 0.0]);
@@ -39,5 +39,5 @@ fn what_the_bags_file_says_goes_before_it() {
     // CameraInfo takes precedence over the profile's camera, the file's own camera over CameraInfo.
     assert!(config.camera.is_none());
     assert_eq!(config.profile_camera.unwrap().cy, 117.60);
-    assert!(BagConfig::over_profile(Table::new(), "kitti").is_none());
+    assert!(BagConfig::with_profile(Table::new(), "kitti").is_none());
 }

@@ -21,7 +21,7 @@ const VELOCITY_NAMES: [&str; 6] = [
     "v",
 ];
 /// If a smaller fraction of a scan's points agrees with its estimated velocity, the vehicle's is used instead.
-pub(super) const LEAST_STATIC: f64 = 0.4;
+pub(super) const MIN_STATIC: f64 = 0.4;
 /// Points within this time share a pose, in seconds: at 50 m/s, the error is at most 5 mm.
 const STEP_S: f64 = 1e-4;
 
@@ -38,7 +38,7 @@ pub(super) struct Scan {
 /// A scan projected into a frame's camera. H×W, row by row.
 #[derive(Debug, Clone)]
 pub(super) struct SeenScan {
-    /// Camera z in metres, 0 = none.
+    /// Camera z in metres, 0 = no depth.
     pub(super) depth: DepthMap,
     /// Index of the scan's point at each pixel; [`SeenScan::NONE`] if there is none.
     point: Vec<u32>,
@@ -157,7 +157,7 @@ impl Scan {
             return Some(radial.clone());
         }
         let by_scan = ego_velocity(&self.xyz, radial, vehicle)
-            .filter(|ego| ego.static_share >= LEAST_STATIC)
+            .filter(|ego| ego.static_share >= MIN_STATIC)
             .map(|ego| ego.velocity);
         let velocity = by_scan.or(vehicle)?;
         Some(ground_radial(&self.xyz, radial, &velocity))
@@ -213,7 +213,7 @@ mod tests {
 
     /// A ray without a return would otherwise be a point at the scanner's own position, which may be in the image.
     #[test]
-    fn a_ray_without_an_echo_is_no_depth() {
+    fn rays_without_a_return_give_no_depth() {
         let scan = Scan {
             xyz: vec![[0.0; 3], [f32::NAN; 3], [0.0, 0.0, 8.0]],
             ..Scan::default()
@@ -232,7 +232,7 @@ mod tests {
 
     /// A wall 10 m ahead, measured by a rotating scanner on its left before the frame and on its right after it, while driving at 10 m/s.
     #[test]
-    fn each_point_is_seen_from_where_it_was_measured() {
+    fn points_are_projected_from_the_pose_at_their_own_time() {
         let scan = Scan {
             xyz: vec![[-1.0, 0.0, 10.0], [1.0, 0.0, 10.0]],
             after_s: Some(vec![-0.05, 0.05]),

@@ -5,7 +5,7 @@ use super::doppler::ego_velocity;
 use super::dynamic::{DynamicPoints, MatchedPoints};
 use super::image;
 use super::index::{self, MessageRef};
-use super::scan::{LEAST_STATIC, Scan, SeenScan};
+use super::scan::{MIN_STATIC, Scan, SeenScan};
 use crate::truth::MovingPixels;
 use crate::{DynamicAgreement, GtKind, LidarMotion, MotionModel, Result, ScanTruth};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
@@ -145,7 +145,7 @@ impl BagScans {
             Some(ground) => Some(self.fast(&ground)),
             None => self
                 .listed(&scan, scan_s)?
-                .filter(MatchedPoints::is_of_scan)
+                .filter(MatchedPoints::belongs_to_scan)
                 .map(|listed| listed.moves),
         };
         let seen = self.seen(&scan, frame_s, scan_s);
@@ -191,7 +191,7 @@ impl BagScans {
             };
             // Without an initial value, so that the estimate does not depend on the vehicle's velocity.
             let ego = ego_velocity(&scan.xyz, radial, None);
-            if let Some(ego) = ego.filter(|ego| ego.static_share >= LEAST_STATIC) {
+            if let Some(ego) = ego.filter(|ego| ego.static_share >= MIN_STATIC) {
                 motions.push(LidarMotion {
                     time_s: *time_s,
                     by_scan_mps: vehicle_from_lidar.rotate(&ego.velocity),

@@ -31,7 +31,7 @@ pub(super) fn motion(
     if index.speed_mps.is_empty() {
         return Ok(None);
     }
-    let turns = index.says_turns();
+    let turns = index.has_yaw_rates();
     // A steering angle without a wheelbase gives no turn, so it cannot replace a measured yaw rate.
     let steered = !index.steering_rad.is_empty() && config.vehicle.wheelbase_m.is_some();
     if turns && index.imu.is_empty() && !steered {

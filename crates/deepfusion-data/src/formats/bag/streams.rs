@@ -35,7 +35,7 @@ pub(super) fn streams(
             Some(TopicRole::Truth) => ("pose", index.truth.iter().map(|s| s.0).collect()),
             Some(TopicRole::CameraInfo) => ("camera_info", Vec::new()),
             Some(TopicRole::Can) => ("can", Vec::new()),
-            None if topics.holds_frames(&topic.name) => ("frames", Vec::new()),
+            None if topics.has_frames(&topic.name) => ("frames", Vec::new()),
             None => ("other", Vec::new()),
         };
         let origin = times.first().copied().unwrap_or_default();

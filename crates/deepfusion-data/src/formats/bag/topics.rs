@@ -125,7 +125,7 @@ impl Topics {
     }
 
     /// Whether a topic has transforms of frames.
-    pub(super) fn holds_frames(&self, topic: &str) -> bool {
+    pub(super) fn has_frames(&self, topic: &str) -> bool {
         self.frames.iter().any(|name| name == topic)
     }
 
@@ -190,7 +190,7 @@ impl Search<'_> {
         (!self.given.contains(&role)).then(|| self.config.to_owned())
     }
 
-    /// The named topic, or the only one of these types; `None` if no topic is to be read or found.
+    /// The named topic, or the only one of these types; `None` if none is to be read, or none is found.
     fn one(
         &self,
         role: TopicRole,

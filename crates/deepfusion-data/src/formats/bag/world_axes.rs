@@ -1,7 +1,7 @@
 //! Recognises velocities in world axes: a GPS receiver's, to the east and to the north, in the same message type as the vehicle's own.
 
 /// Below this speed, the direction is unreliable, m/s.
-const LEAST_MPS: f64 = 2.0;
+const MIN_SPEED_MPS: f64 = 2.0;
 /// Lateral velocity / speed: 17° off the vehicle's x, which never occurs at the rear axle, and ahead of it only in tight bends.
 const ACROSS: f64 = 0.3;
 
@@ -14,7 +14,7 @@ const FAR_ACROSS: f64 = 0.7;
 pub(super) fn are_world_axes(velocities: impl Iterator<Item = (f64, f64)>) -> bool {
     let across = velocities.filter_map(|(x, y)| {
         let speed = x.hypot(y);
-        (speed > LEAST_MPS).then(|| y.abs() / speed)
+        (speed > MIN_SPEED_MPS).then(|| y.abs() / speed)
     });
     let mut across: Vec<f64> = across.collect();
     across.sort_by(f64::total_cmp);
@@ -32,7 +32,7 @@ mod tests {
 
     /// A drive around a block at 10 m/s (north, west, south, east), and one mostly to the east.
     #[test]
-    fn a_course_is_not_taken_for_the_vehicle_s_axes() {
+    fn velocities_in_world_axes_are_recognised() {
         let to = |course: f64| (10.0 * course.cos(), 10.0 * course.sin());
         let block = (0..100).map(|i| to(f64::from(i / 25 + 1) * std::f64::consts::FRAC_PI_2));
         assert!(are_world_axes(block));
@@ -41,7 +41,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_goes_along_its_own_axes() {
+    fn velocities_in_the_vehicles_axes_are_not_mistaken() {
         // Bends at a point 1.5 m ahead of the axle, reversing, and speeds too low to have a direction.
         let bend = |i: i32| (8.0, 1.5 * 0.4 * f64::from(i % 3 - 1));
         assert!(!are_world_axes((0..99).map(bend)));

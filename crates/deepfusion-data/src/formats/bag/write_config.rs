@@ -133,17 +133,17 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
             }
         };
     }
-    for mount in &mounts.said {
+    for mount in &mounts.known {
         text += &mount_text(mount, &file);
     }
-    if !mounts.said.iter().any(|m| m.name == "cam_from_vehicle") {
+    if !mounts.known.iter().any(|m| m.name == "cam_from_vehicle") {
         text += CAMERA_PLACE;
     }
     for (key, value) in own.iter().filter(|(_, value)| is_table(value)) {
-        let mut alone = Table::new();
-        alone.insert(key.clone(), value.clone());
+        let mut table = Table::new();
+        table.insert(key.clone(), value.clone());
         text.push('\n');
-        text += &toml::to_string(&alone)
+        text += &toml::to_string(&table)
             .map_err(|e| config.wrong(ConfigProblem::Unwritable(Box::new(e))))?;
     }
     if !own.contains_key("vehicle") {

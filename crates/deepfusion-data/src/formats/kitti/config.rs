@@ -9,8 +9,8 @@ use std::path::Path;
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Keys {
-    clock: Ahead,
-    vehicle: Speed,
+    clock: ClockKeys,
+    vehicle: VehicleKeys,
     simulated: Option<bool>,
     yaw_known: Option<bool>,
     tilt_known: Option<bool>,
@@ -20,7 +20,7 @@ struct Keys {
 /// The table `[clock]`.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct Ahead {
+struct ClockKeys {
     /// How far the cameras' clock is ahead of the oxts', in seconds.
     camera_ahead_s: Option<f64>,
 }
@@ -28,7 +28,7 @@ struct Ahead {
 /// The table `[vehicle]`.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct Speed {
+struct VehicleKeys {
     /// True speed / measured speed.
     speed_scale: Option<f64>,
 }
@@ -50,7 +50,7 @@ pub(super) struct DriveConfig {
 
 /// Whether the drive in a folder is simulated, according to `dataset.toml` in that folder, otherwise in its date's. `None` if neither sets
 /// it or can be read.
-pub(super) fn says_simulated(drive: &Path) -> Option<bool> {
+pub(super) fn marked_as_simulated(drive: &Path) -> Option<bool> {
     Keys::of(drive).ok()?.simulated
 }
 
@@ -64,10 +64,10 @@ impl Keys {
         let date = drive.parent().map(Self::read);
         let date = date.transpose()?.unwrap_or_default();
         Ok(Self {
-            clock: Ahead {
+            clock: ClockKeys {
                 camera_ahead_s: own.clock.camera_ahead_s.or(date.clock.camera_ahead_s),
             },
-            vehicle: Speed {
+            vehicle: VehicleKeys {
                 speed_scale: own.vehicle.speed_scale.or(date.vehicle.speed_scale),
             },
             simulated: own.simulated.or(date.simulated),

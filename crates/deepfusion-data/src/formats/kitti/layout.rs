@@ -1,7 +1,7 @@
 //! Finds drives below a path, and the drive around a path.
 
 use super::calibration::Calibration;
-use super::config::says_simulated;
+use super::config::marked_as_simulated;
 use super::moving::MASKS;
 use crate::formats::shared::files::folders;
 use crate::{Error, Result};
@@ -61,7 +61,7 @@ impl Drive {
         /// Name of the file with exact poses.
         const POSES: &str = "poses.txt";
         let has = |part: &str| self.folder.join(part).exists();
-        says_simulated(&self.folder).unwrap_or_else(|| has(POSES) && has(MASKS))
+        marked_as_simulated(&self.folder).unwrap_or_else(|| has(POSES) && has(MASKS))
     }
 
     /// Path of a frame's velodyne scan, if it exists.

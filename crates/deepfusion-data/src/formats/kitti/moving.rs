@@ -126,7 +126,7 @@ impl MovingPixels for Boxes {
             *depth > 0.0
                 && !boxes.is_empty()
                 && velo_point(&self.pixels_from_velo, pixel, f64::from(*depth), kind)
-                    .is_some_and(|point| boxes.iter().any(|b| b.holds(&point)))
+                    .is_some_and(|point| boxes.iter().any(|b| b.contains(&point)))
         };
         Ok(Some(truth.data.iter().enumerate().map(moves).collect()))
     }
@@ -135,7 +135,7 @@ impl MovingPixels for Boxes {
 impl MovingBox {
     /// Whether a point (velodyne axes, metres) is inside the box or within the margin of its sides. There is no margin
     /// below its bottom, since that is the road.
-    fn holds(&self, point: &Vector3<f64>) -> bool {
+    fn contains(&self, point: &Vector3<f64>) -> bool {
         let from_centre = point - self.pose.bottom_m;
         let (sin, cos) = self.pose.yaw_rad.sin_cos();
         let along = cos * from_centre.x + sin * from_centre.y;

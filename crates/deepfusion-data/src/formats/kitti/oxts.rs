@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_are_where_dataformat_says() {
+    fn fields_are_in_the_order_of_dataformat_txt() {
         let read = OxtsPacket::parse(&packet().join(" ")).unwrap();
         assert_eq!(read.attitude_rad, [3.5, 4.5, 5.5]);
         assert_eq!(read.velocity_mps, [8.5, 9.5, 10.5]);

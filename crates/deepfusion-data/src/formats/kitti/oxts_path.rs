@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_closes() {
+    fn the_path_of_a_circle_closes() {
         // 10 m/s and a full turn in 20 s: a circle of radius 31.8 m, sampled at 100 Hz.
         let turn = std::f64::consts::TAU / 20.0;
         let packets: Vec<_> = (0..=2000)
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn clocks_that_differ_a_little_are_no_gap() {
+    fn slightly_different_clocks_leave_no_gap() {
         let path = UnitPath::new(&[(0.0, packet(0.0, 0.1)), (0.1, packet(0.0, 0.1))]);
         for t in [-0.01, 0.05, 0.11] {
             let place = path.at(t).unwrap().translation();

@@ -56,7 +56,7 @@ pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Resu
     if !datasets.is_empty() {
         return Ok(datasets);
     }
-    Err(match selection.nothing(path) {
+    Err(match selection.nothing_selected(path) {
         Some(error) if images > 0 => error,
         _ => {
             let camera = options.camera.cameras()[0].number();

@@ -183,16 +183,16 @@ impl OpenTracklet {
 
     fn take(&mut self) -> Result<Tracklet, TrackletsProblem> {
         let open = std::mem::take(self);
-        let count = there(open.announced, "poses")?;
+        let count = required(open.announced, "poses")?;
         enough(count, open.poses.len(), TrackletPart::Poses)?;
         Ok(Tracklet {
-            object: there(open.object, "objectType")?,
+            object: required(open.object, "objectType")?,
             size_m: [
-                there(open.length, "l")?,
-                there(open.width, "w")?,
-                there(open.height, "h")?,
+                required(open.length, "l")?,
+                required(open.width, "w")?,
+                required(open.height, "h")?,
             ],
-            first_frame: there(open.first_frame, "first_frame")?,
+            first_frame: required(open.first_frame, "first_frame")?,
             poses: open.poses,
         })
     }
@@ -215,27 +215,31 @@ impl OpenPose {
         let open = std::mem::take(self);
         Ok(TrackletPose {
             bottom_m: Vector3::new(
-                there(open.tx, "tx")?,
-                there(open.ty, "ty")?,
-                there(open.tz, "tz")?,
+                required(open.tx, "tx")?,
+                required(open.ty, "ty")?,
+                required(open.tz, "tz")?,
             ),
-            yaw_rad: there(open.rz, "rz")?,
+            yaw_rad: required(open.rz, "rz")?,
         })
     }
 }
 
-fn there<T>(part: Option<T>, element: &'static str) -> Result<T, TrackletsProblem> {
+fn required<T>(part: Option<T>, element: &'static str) -> Result<T, TrackletsProblem> {
     part.ok_or(TrackletsProblem::Lacks { element })
 }
 
 fn number<T: std::str::FromStr>(text: &str) -> Result<T, TrackletsProblem> {
-    let problem = |_| TrackletsProblem::NotACount { text: shown(text) };
+    let problem = |_| TrackletsProblem::NotACount {
+        text: shortened(text),
+    };
     text.trim().parse().map_err(problem)
 }
 
 fn finite(text: &str) -> Result<f64, TrackletsProblem> {
     let value: Option<f64> = text.trim().parse().ok().filter(|v: &f64| v.is_finite());
-    value.ok_or_else(|| TrackletsProblem::NotANumber { text: shown(text) })
+    value.ok_or_else(|| TrackletsProblem::NotANumber {
+        text: shortened(text),
+    })
 }
 
 fn length(text: &str) -> Result<f64, TrackletsProblem> {
@@ -246,7 +250,7 @@ fn length(text: &str) -> Result<f64, TrackletsProblem> {
 }
 
 /// A text, shortened for a message.
-fn shown(text: &str) -> String {
+fn shortened(text: &str) -> String {
     text.trim().chars().take(40).collect()
 }
 
@@ -301,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_is_where_the_file_puts_it() {
+    fn poses_and_sizes_are_read() {
         let read = parse(&file(&POSE.repeat(2), 2)).unwrap();
         let van = &read[0];
         assert_eq!((read.len(), van.object.as_str()), (1, "Van"));
@@ -320,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_its_place() {
+    fn errors_name_the_tracklet_pose_and_field() {
         let cases = [
             (
                 file(&POSE.replace("13.7", "NaN"), 1),

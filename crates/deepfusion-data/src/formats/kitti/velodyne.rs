@@ -80,7 +80,7 @@ mod tests {
 
     /// Both kinds of ground truth give back the original point, up to the rounding to pixels.
     #[test]
-    fn a_pixel_leads_back_to_its_point() {
+    fn a_pixel_gives_back_its_point() {
         // Camera axes from the velodyne's, 0.27 m behind the camera's plane, KITTI's focal length.
         let pixels_from_velo = Matrix3x4::new(
             609.56, -721.54, 0.0, -164.6, 172.85, 0.0, -721.54, -46.7, 1.0, 0.0, 0.0, -0.27,

@@ -14,16 +14,16 @@ use crate::{
 };
 use deepfusion_rosbag::MessageSource;
 use deepfusion_video::is_video;
-use neighbours::{NeighbourSearch, holds_outputs, unread};
+use neighbours::{NeighbourSearch, contains_outputs, unread};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl Dataset {
     /// Opens a recording of any known layout, which is recognised by its files. A KITTI raw drive, date or root gives one data set for
     /// each drive and camera, in order of names; KITTI odometry one for each sequence, KITTI-360 one for each drive, nuScenes one for
-    /// each scene. A bag, a folder of images, a video file, a comma2k19 segment and a folder of RGB-D frames give one. A folder of such recordings whose
-    /// `dataset.toml` has `for_folders = true` gives those of each. Drives without images of the camera, or without a selected frame, are
-    /// left out.
+    /// each scene. A bag, a folder of images, a video file, a comma2k19 segment and a folder of RGB-D frames give one. A folder of such
+    /// recordings whose `dataset.toml` has `for_folders = true` gives those of each. Drives without images of the camera, or without a
+    /// selected frame, are left out.
     ///
     /// The sizes of all images are checked against the calibration. Times and speeds may be missing
     /// (evaluation needs neither), but must be readable if they exist. If something else in the folder looks like a recording, the
@@ -49,11 +49,11 @@ impl Dataset {
         Ok(Layout::of(path)?.kind())
     }
 
-    /// Whether every recording at a path is marked as simulated by the files beside its images ([`Self::is_simulated`]), found without opening
-    /// it; for a bag, only the file beside it counts. `false` if there is no recording.
+    /// Whether every recording at a path is marked as simulated by the files beside its images ([`Self::is_simulated`]), found without
+    /// opening it; for a bag, only the file beside it counts. `false` if there is no recording.
     #[must_use]
     pub fn all_simulated_at(path: &Path) -> bool {
-        Layout::of(path).is_ok_and(|layout| layout.says_simulated())
+        Layout::of(path).is_ok_and(|layout| layout.marked_as_simulated())
     }
 
     /// Opens a recording of messages, such as a bag in another format, like [`Self::open`] opens a bag: topics are found
@@ -96,7 +96,7 @@ impl Layout {
         if FolderConfig::read_for_folders(path)?.is_some() {
             let mut found = Vec::new();
             // Skip predictions and decoded frames, which are images too.
-            for folder in recordings.iter().filter(|folder| !holds_outputs(folder)) {
+            for folder in recordings.iter().filter(|folder| !contains_outputs(folder)) {
                 // An invalid recording is an error, not silently left out.
                 found.extend(Self::known(folder)?.map(|layout| (folder.clone(), layout)));
             }
@@ -209,16 +209,17 @@ impl Layout {
     }
 
     /// Whether the files beside the images mark every recording as simulated.
-    fn says_simulated(&self) -> bool {
-        let says = |folder: &Path| FolderConfig::read(folder).is_ok_and(|config| config.simulated);
+    fn marked_as_simulated(&self) -> bool {
+        let is_marked =
+            |folder: &Path| FolderConfig::read(folder).is_ok_and(|config| config.simulated);
         match self {
             Self::Kitti(drives) => drives.iter().all(Drive::is_simulated),
-            Self::Bags(bags) => bags.iter().all(|bag| bag::says_simulated(bag)),
-            Self::RgbD(folders) => folders.iter().all(|folder| says(folder)),
-            Self::Comma(folder) | Self::Folder(folder) => says(folder),
-            Self::Video(place) if place.is_dir() => says(place),
-            Self::Video(file) => file.parent().is_some_and(says),
-            Self::Several(all) => all.iter().all(|(_, layout)| layout.says_simulated()),
+            Self::Bags(bags) => bags.iter().all(|bag| bag::marked_as_simulated(bag)),
+            Self::RgbD(folders) => folders.iter().all(|folder| is_marked(folder)),
+            Self::Comma(folder) | Self::Folder(folder) => is_marked(folder),
+            Self::Video(place) if place.is_dir() => is_marked(place),
+            Self::Video(file) => file.parent().is_some_and(is_marked),
+            Self::Several(all) => all.iter().all(|(_, layout)| layout.marked_as_simulated()),
             Self::KittiOdometry(_) | Self::Kitti360(_) | Self::NuScenes(_) => false,
         }
     }
@@ -248,7 +249,7 @@ impl Layout {
                 topic: topic.clone(),
             });
         }
-        if options.gives_camera() && self.kind().brings_calibration() {
+        if options.gives_camera() && self.kind().has_own_calibration() {
             return Err(Error::OwnCalibration {
                 path: path.to_owned(),
                 layout: self.kind().label(),
@@ -329,7 +330,7 @@ impl Layout {
                 let apart = |(folder, layout): (PathBuf, Self)| layout.apart(&folder);
                 all.into_iter().flat_map(apart).collect()
             }
-            whole => vec![(path.to_owned(), whole)],
+            single => vec![(path.to_owned(), single)],
         }
     }
 
@@ -373,7 +374,7 @@ fn open_several(
         match layout.open_warning(folder, options) {
             Ok(found) => datasets.extend(found),
             Err(Error::SplitSelectsNothing { .. }) => {
-                refused = Selection::new(options).nothing(path);
+                refused = Selection::new(options).nothing_selected(path);
             }
             Err(error) if layout.lacks_images(&error) => {
                 without_images.push(name_of(folder));
@@ -401,8 +402,8 @@ fn each<T>(
     place: impl Fn(&T) -> PathBuf,
     layout: impl Fn(Vec<T>) -> Layout,
 ) -> Vec<(PathBuf, Layout)> {
-    let alone = |one: T| (place(&one), layout(vec![one]));
-    all.into_iter().map(alone).collect()
+    let single = |one: T| (place(&one), layout(vec![one]));
+    all.into_iter().map(single).collect()
 }
 
 /// The path as given, with unresolved links, since a bag's file may be beside the link; the resolved path if the given
@@ -434,7 +435,7 @@ mod tests {
     }
 
     #[test]
-    fn what_dataset_toml_names_is_read() {
+    fn files_named_in_dataset_toml_are_not_other_recordings() {
         let root = tempfile::tempdir().unwrap();
         let at = root.path();
         write(
@@ -464,7 +465,7 @@ mod tests {
 
     /// In a folder whose settings apply to its subfolders.
     #[test]
-    fn outputs_in_a_fleet_are_no_recordings_and_what_is_deeper_is_said() {
+    fn outputs_are_not_recordings_and_deeper_folders_are_reported() {
         let root = tempfile::tempdir().unwrap();
         let at = root.path();
         let files = [
@@ -487,12 +488,12 @@ mod tests {
         assert_eq!(names, ["monday", "tuesday"]);
         assert_eq!(passed_over(at), None);
         write(at, &["week/monday/0.png", "week/dataset.toml"]);
-        let said = passed_over(at).unwrap();
-        assert!(said.contains("and is not read: week"), "{said}");
+        let message = passed_over(at).unwrap();
+        assert!(message.contains("and is not read: week"), "{message}");
     }
 
     #[test]
-    fn the_folder_of_the_images_is_read() {
+    fn the_folder_of_images_is_not_another_recording() {
         let root = tempfile::tempdir().unwrap();
         let at = root.path();
         write(at, &["frames/0.png", "frames/0.mp4", "speed.csv"]);

@@ -52,7 +52,7 @@ pub(crate) fn unread(folder: &Path, wanted: NeighbourSearch) -> Vec<String> {
             .file_type()
             .is_ok_and(|kind| kind.is_dir() || kind.is_symlink() && path.is_dir());
         let is_recording = if is_folder {
-            wanted.folders && holds_a_recording(&path)
+            wanted.folders && contains_recording(&path)
         } else {
             is_bag(&path) || wanted.videos && is_source_video(&path)
         };
@@ -65,7 +65,7 @@ pub(crate) fn unread(folder: &Path, wanted: NeighbourSearch) -> Vec<String> {
 }
 
 /// Whether a folder has outputs: those of `predict` or `perceive`, or a video's decoded frames.
-pub(crate) fn holds_outputs(folder: &Path) -> bool {
+pub(crate) fn contains_outputs(folder: &Path) -> bool {
     let is_of_frames = folder.extension().is_some_and(|ending| ending == "frames");
     let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     entries.any(|entry| {
@@ -75,7 +75,7 @@ pub(crate) fn holds_outputs(folder: &Path) -> bool {
     })
 }
 
-fn holds_a_recording(folder: &Path) -> bool {
+fn contains_recording(folder: &Path) -> bool {
     let mut found = comma::is_segment(folder);
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();

@@ -80,19 +80,19 @@ pub(crate) fn open(
     let scenes = read_scenes(&place.tables)?;
     let all = scenes.len();
     let mut first = None;
-    let mut here = Vec::new();
+    let mut found = Vec::new();
     for scene in scenes {
         first = first.or_else(|| scene.images.first().map(|image| image.file.clone()));
         let files = scene
             .images
             .iter()
             .map(|image| place.root.join(&image.file));
-        let there: Vec<bool> = files.map(|file| file.is_file()).collect();
-        if there.contains(&true) {
-            here.push((scene, there));
+        let exist: Vec<bool> = files.map(|file| file.is_file()).collect();
+        if exist.contains(&true) {
+            found.push((scene, exist));
         }
     }
-    if here.is_empty() {
+    if found.is_empty() {
         let named = first.unwrap_or_else(|| format!("samples/{CAMERA}"));
         return Err(Error::NoFrames {
             path: place.root.join(named),
@@ -103,14 +103,14 @@ pub(crate) fn open(
             },
         });
     }
-    open_each(path, here, options, |(scene, there)| {
-        place.open(scene, &there, options)
+    open_each(path, found, options, |(scene, exist)| {
+        place.open(scene, &exist, options)
     })
 }
 
 impl TableFolder {
-    /// Opens a scene; `there` marks which of its images exist (at least one).
-    fn open(&self, scene: Scene, there: &[bool], options: &OpenOptions) -> Result<Dataset> {
+    /// Opens a scene; `exist` says for each of its images whether the file exists (at least one does).
+    fn open(&self, scene: Scene, exist: &[bool], options: &OpenOptions) -> Result<Dataset> {
         let Scene {
             name,
             images,
@@ -118,20 +118,20 @@ impl TableFolder {
         } = scene;
         let times: Vec<i64> = images.iter().map(|image| image.ns).collect();
         let numbered = numbers_by_time(&times).into_iter().zip(&images);
-        let here = numbered.zip(there).filter(|(_, there)| **there);
-        let here: Vec<(u64, &SensorFrame)> = here.map(|(image, _)| image).collect();
+        let found = numbered.zip(exist).filter(|(_, exist)| **exist);
+        let found: Vec<(u64, &SensorFrame)> = found.map(|(image, _)| image).collect();
         let mut warnings = Vec::new();
-        if let Some((gone, _)) = images.iter().zip(there).find(|(_, there)| !**there) {
+        if let Some((first_missing, _)) = images.iter().zip(exist).find(|(_, exist)| !**exist) {
             let missing = IncompleteWarning::ImagesMissing {
-                missing: images.len() - here.len(),
+                missing: images.len() - found.len(),
                 of: images.len(),
-                such_as: gone.file.clone(),
+                such_as: first_missing.file.clone(),
             };
             warnings.push(missing.into());
         }
         let calibrations = self.tables.join(CALIBRATED_SENSOR);
         let one_camera = images.iter().all(|image| image.sensor == images[0].sensor);
-        let (true, Some((_, first))) = (one_camera, here.first()) else {
+        let (true, Some((_, first))) = (one_camera, found.first()) else {
             return Err(Error::CameraFile {
                 by: calibrations.into(),
                 problem: CameraProblem::Several {
@@ -148,17 +148,17 @@ impl TableFolder {
         let mut poses: Vec<(i64, Se3)> = poses.map(|t| (t.ns, t.world_from_vehicle)).collect();
         poses.sort_by_key(|(ns, _)| *ns);
         let speeds = speed_log(&self.tables.join("ego_pose.json"), &poses);
-        let truth = self.truth(&here, &scans, &calibration.intrinsics);
-        let image = |(number, taken): &(u64, &SensorFrame)| TimedImage {
+        let truth = self.truth(&found, &scans, &calibration.intrinsics);
+        let image = |(number, frame): &(u64, &SensorFrame)| TimedImage {
             number: *number,
-            path: self.root.join(&taken.file),
-            ns: Some(taken.ns),
+            path: self.root.join(&frame.file),
+            ns: Some(frame.ns),
         };
         PlainParts {
             kind: DatasetKind::NuScenes,
             folder: self.root.clone(),
             name,
-            images: here.iter().map(image).collect(),
+            images: found.iter().map(image).collect(),
             video: None,
             calibration,
             camera_ahead_s: options.camera_ahead_s.unwrap_or(0.0),
@@ -168,9 +168,9 @@ impl TableFolder {
             cam_from_vehicle: vehicle_from_cam.inverse(),
             camera: Camera::Left,
             truth,
-            world_from_cam: here
+            world_from_cam: found
                 .iter()
-                .map(|(number, taken)| (*number, taken.world_from_vehicle * vehicle_from_cam))
+                .map(|(number, frame)| (*number, frame.world_from_vehicle * vehicle_from_cam))
                 .collect(),
             streams: Vec::new(),
             warnings,

@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_cut_where_they_end_and_not_within_text() {
+    fn rows_are_split_at_their_ends_but_not_inside_strings() {
         let text = b"[\n{\n\"name\": \"a}]\\\"{\",\n\"more\": [{\"x\": []}],\n\"n\": 1\n},\n{\"name\": \"b\", \"n\": 2.5}\n]\n";
         let expected = [(5, "a}]\"{".to_owned(), 1.0), (7, "b".to_owned(), 2.5)];
         assert_eq!(read(text).unwrap(), expected);
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_line_and_field() {
+    fn errors_name_line_and_field() {
         let cases: [(&[u8], usize, &str, &str); 7] = [
             (
                 b"[\n{\"name\": \"a\",\n\"n\": \"one\"}]",

@@ -61,7 +61,7 @@ fn can_be_made(folder: &Path) -> io::Result<()> {
     Err(ErrorKind::NotFound.into())
 }
 
-/// The same, by trying it.
+/// Whether a folder can be created, with its missing parents, by trying it.
 #[cfg(not(unix))]
 fn can_be_made(folder: &Path) -> io::Result<()> {
     deepfusion_fs::PartialFolder::beside(folder).map(drop)
@@ -74,11 +74,11 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn frames_go_to_the_users_cache_where_the_videos_folder_cannot_be_written() {
+    fn frames_are_kept_in_the_users_cache_if_the_videos_folder_is_not_writable() {
         let root = tempfile::tempdir().unwrap();
         let cache = root.path().join("cache");
-        let there = root.path().join("drive.mp4");
-        let found = folder_for_frames(&there, Some(cache.clone())).unwrap();
+        let video = root.path().join("drive.mp4");
+        let found = folder_for_frames(&video, Some(cache.clone())).unwrap();
         assert_eq!(found, root.path());
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 0);
 
@@ -99,7 +99,7 @@ mod tests {
     /// The folder must not change, or programs that watch it, to copy or index it, would start needlessly.
     #[cfg(unix)]
     #[test]
-    fn to_find_a_place_writes_nothing() {
+    fn choosing_a_folder_writes_nothing() {
         let root = tempfile::tempdir().unwrap();
         let folder = fs::File::open(root.path()).unwrap();
         let long_ago = std::time::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000_000);
@@ -111,7 +111,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_leads_to_where_the_frames_are_kept() {
+    fn a_link_to_a_folder_for_frames_is_followed() {
         use std::os::unix::fs::{PermissionsExt, symlink};
 
         let root = tempfile::tempdir().unwrap();

@@ -37,7 +37,7 @@ pub(crate) fn open_each<T>(
             Err(other) => return Err(other),
         }
     }
-    match Selection::new(options).nothing(path) {
+    match Selection::new(options).nothing_selected(path) {
         Some(error) if any && datasets.is_empty() => Err(error),
         _ => Ok(datasets),
     }
@@ -237,7 +237,7 @@ impl PlainParts {
     fn describe_camera(&mut self, lens: &Lens) {
         // A layout with its own calibration has images of one size, and an assumed camera is learned in training.
         let known = self.calibration.size_in_file || self.calibration.assumed;
-        if !known && !self.kind.brings_calibration() {
+        if !known && !self.kind.has_own_calibration() {
             let k = &self.calibration.intrinsics;
             let unknown = CameraWarning::SizeUnknown {
                 by: self.calibration.source.clone(),

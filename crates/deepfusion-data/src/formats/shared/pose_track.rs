@@ -14,11 +14,11 @@ const WINDOW_S: f64 = 0.16;
 /// Poses farther apart are not bridged, as in [`crate::VehicleTrack`].
 const MAX_GAP_S: f64 = 0.5;
 /// Poses closer together than this count as one, in ns.
-const LEAST_STEP_NS: i64 = 2_000_000;
+const MIN_STEP_NS: i64 = 2_000_000;
 /// Shortest distance from which the direction of travel is determined, in metres.
-const LEAST_WAY_M: f64 = 20.0;
+const MIN_PATH_M: f64 = 20.0;
 /// Least cosine of the angle between the camera's axis and the direction of travel: 20°.
-const AHEAD: f64 = 0.94;
+const MIN_COSINE: f64 = 0.94;
 
 /// The speeds of a vehicle (x forward, y left, z up, metres) from its poses in any fixed world frame, on the clock of their
 /// times (ns). A pose without another within half a second has no speed.
@@ -34,7 +34,7 @@ pub(crate) fn speed_log(path: &Path, world_from_vehicle: &[(i64, Se3)]) -> Speed
     for pose in world_from_vehicle {
         if rising
             .last()
-            .is_none_or(|last| pose.0.saturating_sub(last.0) >= LEAST_STEP_NS)
+            .is_none_or(|last| pose.0.saturating_sub(last.0) >= MIN_STEP_NS)
         {
             rising.push(*pose);
         }
@@ -88,7 +88,7 @@ pub(crate) fn speed_log(path: &Path, world_from_vehicle: &[(i64, Se3)]) -> Speed
 /// metres). The vehicle's forward axis is the direction in which its origin moves, and its left axis is level with the camera. If the path
 /// is too short, the camera is assumed to look straight ahead.
 pub(crate) fn cam_from_vehicle(world_from_cam: &[Se3], vehicle_in_cam: Vector3<f64>) -> Se3 {
-    let (mut forward, mut way_m) = (Vector3::zeros(), 0.0);
+    let (mut forward, mut path_m) = (Vector3::zeros(), 0.0);
     for pair in world_from_cam.windows(2) {
         let place = |pose: &Se3| pose.transform(&vehicle_in_cam);
         let moved = place(&pair[1]) - place(&pair[0]);
@@ -97,10 +97,10 @@ pub(crate) fn cam_from_vehicle(world_from_cam: &[Se3], vehicle_in_cam: Vector3<f
         let moved = middle.rotate(&moved);
         // Flip the direction when reversing.
         forward += moved * moved.z.signum();
-        way_m += moved.norm();
+        path_m += moved.norm();
     }
     let ahead = forward / forward.norm().max(1e-9);
-    let forward = if way_m >= LEAST_WAY_M && ahead.z >= AHEAD {
+    let forward = if path_m >= MIN_PATH_M && ahead.z >= MIN_COSINE {
         ahead
     } else {
         Vector3::z()

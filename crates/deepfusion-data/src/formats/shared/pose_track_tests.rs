@@ -44,7 +44,7 @@ fn a_parabola_is_exact_for_constant_acceleration() {
 /// Central differences on a circle: the chord over 2h instead of the arc is too short by a fraction of (ωh)²/6; at the ends, with a
 /// parabola through one side, by twice that. The heading is linear in time, so its slope is exact.
 #[test]
-fn a_circle_is_found_to_the_second_order() {
+fn speeds_on_a_circle_are_accurate_to_second_order() {
     let (r, speed, h) = (12.0, 6.0, 0.1);
     let times: Vec<f64> = (0..30).map(|i| f64::from(i) * h).collect();
     let log = log(&circle(r, speed, &times));
@@ -73,7 +73,7 @@ fn a_circle_is_found_to_the_second_order() {
 /// A world with z down or camera axes gives the same motions, since these are relative to the vehicle. A heading that passes half a turn
 /// does not jump.
 #[test]
-fn the_world_s_axes_do_not_matter() {
+fn motion_does_not_depend_on_the_worlds_axes() {
     let times: Vec<f64> = (0..80).map(|i| f64::from(i) * 0.1).collect();
     let poses = circle(10.0, 8.0, &times);
     let plain = log(&poses);
@@ -99,7 +99,7 @@ fn the_world_s_axes_do_not_matter() {
 
 /// A body that rolls and pitches: its rotation between two poses is that of the poses, up to the error of the yaw rate's slope.
 #[test]
-fn roll_and_pitch_are_the_poses() {
+fn roll_and_pitch_are_those_of_the_poses() {
     let at = |i: i32| {
         let t = f64::from(i) * 0.1;
         let roll_and_pitch = Se3::from_axis_angle(
@@ -125,7 +125,7 @@ fn roll_and_pitch_are_the_poses() {
 
 /// Jitter of a centimetre: with 32 poses per second the slope's error is 3 cm/s; with only the two neighbours it would be 23.
 #[test]
-fn many_poses_average_their_jitter() {
+fn jitter_of_frequent_poses_is_averaged() {
     let mut state = 1_u64;
     let mut jitter = || {
         // A linear congruential generator; the sum of twelve uniform numbers is nearly normal.
@@ -163,7 +163,7 @@ fn gaps_are_not_bridged() {
 
 /// A camera that looks two degrees up and one to the right of the direction of travel, 1 m ahead of the axle.
 #[test]
-fn a_camera_finds_the_way_the_car_goes() {
+fn the_cameras_direction_follows_from_the_path() {
     let nominal = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
     let off = Rotation3::from_euler_angles(-0.035, 0.0175, 0.0);
     let rotation = off.matrix() * nominal;

@@ -209,7 +209,7 @@ pub fn assumed_camera(estimator: &DepthEstimator) -> Option<AssumedCamera> {
     estimator
         .training_camera()
         .as_ref()
-        .map(AssumedCamera::held)
+        .map(AssumedCamera::fixed)
 }
 
 fn drives(settings: &AdaptSettings, config: &TrainConfig) -> DataSetConfig {

@@ -146,7 +146,7 @@ mod tests {
 
     /// All shapes of blocks, several rounds of sums, steps of eight and of sixteen pairs; with both units if the processor has them.
     #[test]
-    fn products_over_taps_are_their_definition() {
+    fn products_over_taps_equal_their_definition() {
         for (rows, pairs, steps) in [(16, 8, 3), (48, 16, 19), (64, 10, 40)] {
             let (columns, plane_len) = (96, 150);
             let source = words(2 * pairs * plane_len, 1);
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn products_over_pixels_are_their_definition() {
+    fn products_over_pixels_equal_their_definition() {
         for (channels, outputs, pixels) in
             [(16, 16, 32), (48, 80, 544), (32, 48, 640), (64, 32, 96)]
         {

@@ -60,7 +60,7 @@ pub(super) struct Kernels<'a> {
 impl Sum<'_> {
     /// Whether this form is faster than plain sums, according to `benches/conv.rs`. It depends on the number of images, so the results for
     /// an image alone and in a batch may differ by rounding.
-    pub(super) fn pays(&self) -> bool {
+    pub(super) fn is_faster(&self) -> bool {
         let grid = Grid::new(self.source.images, self.out);
         self.source.channels.is_multiple_of(LANES)
             && self.rows * self.source.channels >= FEWEST_KERNELS

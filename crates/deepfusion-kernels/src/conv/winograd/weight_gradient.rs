@@ -39,7 +39,7 @@ struct TileBlock<'a> {
 
 impl WeightGradient<'_> {
     /// Whether this form is faster than plain sums, according to `benches/conv.rs`.
-    pub(in crate::conv) fn pays(&self) -> bool {
+    pub(in crate::conv) fn is_faster(&self) -> bool {
         let grid = self.grid();
         self.source.channels >= FEWEST_CHANNELS
             && grid.count() >= FEWEST_TILES

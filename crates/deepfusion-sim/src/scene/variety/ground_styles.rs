@@ -107,7 +107,7 @@ impl Site<'_> {
     }
 
     /// Any of these grounds.
-    fn odd(&mut self) -> Surface {
+    fn any_ground(&mut self) -> Surface {
         let mut surface = self.laid();
         surface.colour = colour(self.rng, 0.8);
         surface.other = colour(self.rng, 0.8);
@@ -129,7 +129,7 @@ impl Site<'_> {
         let road = match self.rng.random_range(0..20) {
             0..=15 => self.asphalt(),
             16..=18 => self.laid(),
-            _ if self.variety.wild > 0.3 => self.odd(),
+            _ if self.variety.wild > 0.3 => self.any_ground(),
             _ => self.loose(),
         };
         let pavement = if self.rng.random_bool(0.75) {

@@ -169,7 +169,7 @@ impl Site<'_> {
     /// A gable roof along or across the street, a hip roof, or a lean-to, with chimneys and dormers.
     fn roof(&mut self, spot: &Spot, size: [f64; 2], height: f64, wall: u32, back: bool) {
         let kit = self.kit;
-        let material = self.often(&kit.roofs);
+        let material = self.any_or_wild(&kit.roofs);
         let across = self.chance(0.3);
         let (turn, [length, width]) = if across {
             (std::f64::consts::FRAC_PI_2, [size[1], size[0]])

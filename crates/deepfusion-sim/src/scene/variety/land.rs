@@ -90,7 +90,7 @@ impl Site<'_> {
     /// A bridge over the road at `s`, with piers `out` metres from the centreline.
     pub(super) fn bridge(&mut self, s: f64, out: f64) {
         let kit = self.kit;
-        let stone = self.often(&kit.stone);
+        let stone = self.any_or_wild(&kit.stone);
         let (height, deep) = (self.draw(4.6, 6.5), self.draw(5.0, 16.0));
         let middle = Spot {
             z: 0.0,

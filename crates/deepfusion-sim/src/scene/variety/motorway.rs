@@ -84,8 +84,8 @@ fn rails(site: &mut Site, half: f64) {
     let kit = site.kit;
     for side in [-1.0, 1.0] {
         let kind = site.rng.random_range(0..6);
-        let metal = site.often(&kit.metal);
-        let stone = site.often(&kit.stone);
+        let metal = site.any_or_wild(&kit.metal);
+        let stone = site.any_or_wild(&kit.stone);
         let out = side * (half + site.draw(0.4, 1.2));
         let (mut s, end) = (site.world.road.start, site.world.road.end());
         let height = site.draw(2.5, 5.0);

@@ -112,7 +112,7 @@ pub(super) fn models(_world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> Vec
     crowd
 }
 
-fn one(rng: &mut ChaCha8Rng, of: &[u32]) -> u32 {
+fn any(rng: &mut ChaCha8Rng, of: &[u32]) -> u32 {
     of[rng.random_range(0..of.len())]
 }
 
@@ -125,15 +125,15 @@ fn walker(figure: &mut Figure, rng: &mut ChaCha8Rng, kit: &Kit) {
     };
     let wide = rng.random_range(0.85..1.2);
     let (coat, legs, shoes) = (
-        one(rng, &kit.cloth),
-        one(rng, &kit.cloth),
+        any(rng, &kit.cloth),
+        any(rng, &kit.cloth),
         if rng.random_bool(0.7) {
             kit.dark
         } else {
-            one(rng, &kit.cloth)
+            any(rng, &kit.cloth)
         },
     );
-    let (skin, hair) = (one(rng, &kit.skin), one(rng, &kit.cloth));
+    let (skin, hair) = (any(rng, &kit.skin), any(rng, &kit.cloth));
     let stride = if rng.random_bool(0.3) {
         0.03
     } else {
@@ -175,7 +175,7 @@ fn walker(figure: &mut Figure, rng: &mut ChaCha8Rng, kit: &Kit) {
     figure.rod([0.0, 0.0, shoulder], [0.01, 0.0, 0.88 * tall], 0.045, skin);
     head(figure, [0.02, 0.0, 0.925 * tall], 0.066 * tall, skin, hair);
     if rng.random_bool(0.35) {
-        let bag = one(rng, &kit.cloth);
+        let bag = any(rng, &kit.cloth);
         if rng.random_bool(0.5) {
             figure.block([-0.19, 0.0, 0.55 * tall], [0.18, 0.3, 0.25 * tall], bag);
         } else {
@@ -191,7 +191,7 @@ fn head(figure: &mut Figure, at: [f64; 3], radius: f64, skin: u32, hair: u32) {
 }
 
 fn bicycle(figure: &mut Figure, rng: &mut ChaCha8Rng, kit: &Kit) {
-    let frame = one(rng, &kit.metal);
+    let frame = any(rng, &kit.metal);
     let radius = 0.33;
     let (rear, front) = ([-0.52, 0.0, 0.34], [0.53, 0.0, 0.34]);
     for hub in [rear, front] {
@@ -214,7 +214,7 @@ fn bicycle(figure: &mut Figure, rng: &mut ChaCha8Rng, kit: &Kit) {
 }
 
 fn motorbike(figure: &mut Figure, rng: &mut ChaCha8Rng, kit: &Kit) {
-    let paint = one(rng, &kit.metal);
+    let paint = any(rng, &kit.metal);
     for x in [-0.68, 0.7] {
         figure.ring([x, 0.0, 0.32], 0.26, 0.07, kit.dark);
     }
@@ -227,8 +227,8 @@ fn motorbike(figure: &mut Figure, rng: &mut ChaCha8Rng, kit: &Kit) {
 }
 
 fn rider(figure: &mut Figure, rng: &mut ChaCha8Rng, kit: &Kit) {
-    let (coat, legs) = (one(rng, &kit.cloth), one(rng, &kit.cloth));
-    let (skin, helmet) = (one(rng, &kit.skin), one(rng, &kit.metal));
+    let (coat, legs) = (any(rng, &kit.cloth), any(rng, &kit.cloth));
+    let (skin, helmet) = (any(rng, &kit.skin), any(rng, &kit.metal));
     let lean = rng.random_range(0.05..0.3);
     let shoulder = [lean - 0.15, 0.0, 1.45];
     figure.rod([-0.27, 0.0, 1.0], shoulder, 0.15, coat);

@@ -10,7 +10,7 @@ impl Site<'_> {
     pub(super) fn lamp(&mut self, spot: &Spot) {
         let kit = self.kit;
         let mark = self.mark();
-        let metal = self.often(&kit.metal);
+        let metal = self.any_or_wild(&kit.metal);
         let height = self.draw(3.5, 9.0);
         let thick = self.draw(0.04, 0.1);
         self.column(spot, thick, height, metal);
@@ -41,7 +41,7 @@ impl Site<'_> {
         let metal = self.any(&kit.metal);
         let height = self.draw(1.9, 3.0);
         self.column(spot, 0.035, height, metal);
-        let board = self.often(&kit.signs);
+        let board = self.any_or_wild(&kit.signs);
         let mut top = height;
         for _ in 0..self.rng.random_range(1..3) {
             let half = self.draw(0.2, 0.45);
@@ -89,12 +89,12 @@ impl Site<'_> {
     }
 
     /// A random object of those found on pavements.
-    pub(super) fn thing(&mut self, spot: &Spot) {
+    pub(super) fn random_prop(&mut self, spot: &Spot) {
         let kit = self.kit;
         let mark = self.mark();
         let class = match self.rng.random_range(0..15) {
             0 => {
-                let metal = self.often(&kit.metal);
+                let metal = self.any_or_wild(&kit.metal);
                 let (r, h) = (self.draw(0.04, 0.16), self.draw(0.5, 1.2));
                 self.column(spot, r, h, metal);
                 if self.chance(0.4) {
@@ -104,7 +104,7 @@ impl Site<'_> {
             }
             1 => {
                 // A bin.
-                let metal = self.often(&kit.metal);
+                let metal = self.any_or_wild(&kit.metal);
                 let (r, h) = (self.draw(0.16, 0.35), self.draw(0.7, 1.15));
                 self.column(spot, r, h, metal);
                 ObjectClass::Misc
@@ -121,7 +121,7 @@ impl Site<'_> {
             }
             4..=5 => {
                 // A cabinet.
-                let metal = self.often(&kit.metal);
+                let metal = self.any_or_wild(&kit.metal);
                 let size = [
                     self.draw(0.4, 1.8),
                     self.draw(0.3, 0.7),
@@ -136,7 +136,7 @@ impl Site<'_> {
             }
             7 => {
                 // A planter.
-                let stone = self.often(&kit.stone);
+                let stone = self.any_or_wild(&kit.stone);
                 let size = self.draw(0.5, 1.6);
                 self.block(spot, [size, 0.6 * size, 0.55], stone);
                 self.bush(&spot.spot(0.0, 0.0, 0.5, 0.0), 0.3 * size + 0.2);
@@ -201,7 +201,7 @@ impl Site<'_> {
     /// A bench along the spot's heading.
     pub(super) fn bench(&mut self, spot: &Spot) {
         let kit = self.kit;
-        let (wood, metal) = (self.often(&kit.wood), self.any(&kit.metal));
+        let (wood, metal) = (self.any_or_wild(&kit.wood), self.any(&kit.metal));
         self.block(&spot.spot(0.0, 0.0, 0.42, 0.0), [1.7, 0.45, 0.06], wood);
         self.block(&spot.spot(0.0, -0.22, 0.5, 0.0), [1.7, 0.06, 0.4], wood);
         for x in [-0.7, 0.7] {
@@ -306,7 +306,7 @@ impl Site<'_> {
             }
             4..=5 => {
                 let mark = self.mark();
-                let wood = self.often(&kit.wood);
+                let wood = self.any_or_wild(&kit.wood);
                 let height = self.draw(0.7, 2.0);
                 self.block(spot, [length, 0.05, height], wood);
                 for x in [-0.5, 0.0] {
@@ -317,7 +317,7 @@ impl Site<'_> {
             }
             6..=8 => {
                 let mark = self.mark();
-                let stone = self.often(&kit.stone);
+                let stone = self.any_or_wild(&kit.stone);
                 let height = self.draw(0.3, 2.4);
                 self.block(spot, [length, 0.25, height], stone);
                 if self.chance(0.5) {
@@ -329,7 +329,7 @@ impl Site<'_> {
             _ => {
                 // Bars or pickets with gaps.
                 let mark = self.mark();
-                let metal = self.often(&kit.metal);
+                let metal = self.any_or_wild(&kit.metal);
                 let foot = if self.chance(0.4) {
                     let stone = self.any(&kit.stone);
                     self.block(spot, [length, 0.25, 0.4], stone);

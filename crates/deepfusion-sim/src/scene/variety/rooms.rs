@@ -79,7 +79,7 @@ impl Site<'_> {
             }
             5 => {
                 // A shelf on the wall.
-                let wood = self.often(&kit.wood);
+                let wood = self.any_or_wild(&kit.wood);
                 let z = self.draw(1.2, 1.9);
                 let at = wall.spot(0.0, 0.13, z, 0.0);
                 self.block(&at, [0.9 * wide, 0.24, 0.03], wood);
@@ -161,7 +161,7 @@ impl Site<'_> {
             }
             7 => {
                 // A counter or a cabinet.
-                let wood = self.often(&kit.wood);
+                let wood = self.any_or_wild(&kit.wood);
                 let high = self.draw(0.6, 1.1);
                 self.block(&at, [wide, 0.95 * deep, high], wood);
                 let top = self.any(&kit.stone);
@@ -178,7 +178,7 @@ impl Site<'_> {
             }
             8 => {
                 // A cupboard, a fridge.
-                let paint = self.often(&[
+                let paint = self.any_or_wild(&[
                     kit.pale,
                     kit.wood[0],
                     kit.wood[1],
@@ -233,7 +233,7 @@ impl Site<'_> {
     /// Boards with books and boxes between two sides of a shelf.
     fn shelf(&mut self, at: &Spot, [wide, deep, height]: [f64; 3]) {
         let kit = self.kit;
-        let wood = self.often(&[kit.wood[0], kit.wood[1], kit.pale, kit.dark, kit.metal[0]]);
+        let wood = self.any_or_wild(&[kit.wood[0], kit.wood[1], kit.pale, kit.dark, kit.metal[0]]);
         let high = self.draw(0.8, 2.3).min(height - 0.05);
         for x in [-0.5, 0.5] {
             self.block(&at.spot(x * wide, 0.0, 0.0, 0.0), [0.03, deep, high], wood);
@@ -285,7 +285,7 @@ impl Site<'_> {
     /// A table with a top of this size.
     fn table(&mut self, at: &Spot, [wide, deep]: [f64; 2], high: f64) {
         let kit = self.kit;
-        let top = self.often(&[
+        let top = self.any_or_wild(&[
             kit.wood[0],
             kit.wood[1],
             kit.wood[2],

@@ -317,7 +317,7 @@ impl Site<'_> {
     }
 
     /// One of these materials, or sometimes a wild one.
-    pub(super) fn often(&mut self, of: &[u32]) -> u32 {
+    pub(super) fn any_or_wild(&mut self, of: &[u32]) -> u32 {
         if self.rng.random_bool(self.variety.wild) {
             let kit = self.kit;
             self.any(&kit.wild)

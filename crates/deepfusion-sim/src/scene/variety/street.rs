@@ -421,7 +421,7 @@ impl Row<'_, '_> {
                         if self.site.chance(0.2) {
                             spot.heading += self.inward();
                         }
-                        self.site.thing(&spot);
+                        self.site.random_prop(&spot);
                     }
                 }
             }

@@ -43,7 +43,7 @@ fn holds(world: &World, solid: &Primitive, point: &Vector3<f64>) -> bool {
 
 /// A car's width around the middle of the camera's lane is free of solids, up to the headroom; in rooms a person's width.
 #[test]
-fn the_camera_s_way_is_free() {
+fn the_camera_s_lane_is_free() {
     for scene in Scene::EVERY {
         for seed in 1..4 {
             let world = world(scene, seed);
@@ -80,7 +80,7 @@ fn the_camera_s_way_is_free() {
 }
 
 #[test]
-fn boxes_of_models_hold_their_solids() {
+fn model_boxes_contain_their_solids() {
     let world = world(Scene::Urban, 5);
     assert!(world.models.len() > 40 && world.crowd.len() > 15);
     for model in world.models.iter().chain(&world.crowd) {
@@ -106,7 +106,7 @@ fn boxes_of_models_hold_their_solids() {
 }
 
 #[test]
-fn boxes_hold_what_stands_in_them() {
+fn object_boxes_contain_their_solids() {
     let mut world = world(Scene::Country, 2);
     let kit_world = &mut world;
     let mut rng = ChaCha8Rng::seed_from_u64(9);
@@ -152,7 +152,7 @@ fn boxes_hold_what_stands_in_them() {
 /// Hills are visible from everywhere, and no solid that is looked up by its position along the street is larger than the distance within
 /// which it is looked up.
 #[test]
-fn large_things_are_found() {
+fn large_solids_are_found_from_everywhere() {
     let mut hills = 0;
     for scene in Scene::EVERY {
         for seed in 1..5 {
@@ -175,7 +175,7 @@ fn large_things_are_found() {
 }
 
 #[test]
-fn no_variety_draws_nothing() {
+fn without_variety_the_world_is_the_plain_one() {
     let none = Variety::none();
     assert!(!none.is_varied() && none == Variety::default());
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -190,7 +190,7 @@ fn no_variety_draws_nothing() {
 
 /// Traffic around a camera keeps its distance and does not overlap it.
 #[test]
-fn traffic_around_a_camera_keeps_off() {
+fn traffic_keeps_its_distance_from_the_camera() {
     let mut met = 0;
     for seed in 1..6 {
         for scene in [Scene::Urban, Scene::Motorway, Scene::Country] {

@@ -138,7 +138,7 @@ mod tests {
 
     /// Between pictures of a camera only the smear changes, which one of twenty has.
     #[test]
-    fn one_camera_takes_many_pictures() {
+    fn pictures_of_one_camera_differ_in_the_smear_only() {
         let formation = Formation::draw(&mut generator(1, 3, 2), Brightness::Day, 0.15);
         let mut smeared = 0;
         for number in 0..1000 {
@@ -153,7 +153,7 @@ mod tests {
 
     /// Every image formation keeps the order of brightness of the scene and shows something.
     #[test]
-    fn every_camera_makes_an_image() {
+    fn every_camera_keeps_the_order_of_brightness() {
         let light = ramp(96, 48);
         let (mut grey, mut clipped) = (0, 0);
         for number in 0..400 {

@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_filter_spreads_a_point_by_its_bell_and_keeps_its_light() {
+    fn a_filter_spreads_a_point_and_keeps_its_sum() {
         let (width, height) = (31, 21);
         let mut plane = vec![0.0; width * height];
         plane[10 * width + 15] = 1.0;
@@ -121,8 +121,8 @@ mod tests {
         filter(&mut plane, &mut vec![0.0; width * height], width, &taps);
         assert!((plane.iter().sum::<f32>() - 1.0).abs() < 1e-5);
         for (dx, dy) in [(0usize, 0usize), (1, 0), (2, 3), (0, 3)] {
-            let there = plane[(10 + dy) * width + 15 - dx];
-            assert!((there - taps[dx] * taps[dy]).abs() < 1e-6);
+            let value = plane[(10 + dy) * width + 15 - dx];
+            assert!((value - taps[dx] * taps[dy]).abs() < 1e-6);
         }
     }
 

@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn the_exposure_reaches_its_aim_and_no_more_than_its_gain() {
+    fn the_exposure_reaches_its_aim_unless_the_gain_is_too_low() {
         for (light, expected) in [(0.05, 0.2), (1.7, 0.2), (0.001, 0.01)] {
             let mut planes = flat(light);
             plain().expose(&mut planes, &mut FastNoise::new(1));
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_bright_is_clipped() {
+    fn overexposed_light_is_clipped() {
         let mut planes = flat(0.1);
         planes.of[1][5] = 9.0;
         plain().expose(&mut planes, &mut FastNoise::new(1));
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tinted_picture_is_made_grey_and_the_dark_black() {
+    fn a_tint_is_removed_and_dark_parts_become_black() {
         let mut planes = flat(0.1);
         planes.of[0] = (0..64 * 64)
             .map(|i| 0.15 + 0.1 * (i % 64) as f32 / 64.0)

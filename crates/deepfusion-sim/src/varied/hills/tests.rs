@@ -108,7 +108,7 @@ fn rays(view: &View, folds: &Folds) -> impl Iterator<Item = (usize, Vector3<f64>
 }
 
 #[test]
-fn the_ground_is_where_its_profile_has_it() {
+fn the_depth_of_the_ground_matches_its_profile() {
     let (mut beyond, mut raised, mut sky) = (0, 0, 0);
     for (view, _, folds) in hilly(24) {
         let pieces = profile(&folds);
@@ -146,7 +146,7 @@ fn the_ground_is_where_its_profile_has_it() {
 
 /// Each visible point, unfolded, is on a surface of the flat world.
 #[test]
-fn what_is_seen_stands_in_the_flat_world() {
+fn visible_points_unfold_onto_surfaces_of_the_flat_world() {
     const BEFORE: f64 = 0.2;
     let (mut right, mut all) = (0, 0);
     for (view, place, folds) in hilly(12) {
@@ -199,7 +199,7 @@ fn what_is_seen_stands_in_the_flat_world() {
 }
 
 #[test]
-fn creases_of_no_angle_change_nothing() {
+fn creases_with_an_angle_of_zero_change_nothing() {
     for (view, place, folds) in hilly(4) {
         let air = Air::of(&place.world);
         let render = |folds: &Folds| {
@@ -233,7 +233,7 @@ fn creases_of_no_angle_change_nothing() {
 }
 
 #[test]
-fn slopes_are_those_of_roads() {
+fn slopes_are_as_on_real_roads() {
     let (mut ups, mut steep, mut most) = (0, 0, 0);
     let (mut cut, mut all) = (0, 0);
     for (view, place, folds) in hilly(60) {
