@@ -48,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hole_is_near_and_seen_far() {
+    fn near_pixels_predicted_far_are_holes() {
         // At the far limit, on something 30 m away: less than three times too far.
         assert_eq!(rate(&[(30.0, Some(72.0))]), Some(1.0));
         assert_eq!(rate(&[(30.0, Some(71.9))]), Some(0.0));
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn far_things_neither_are_holes_nor_count() {
+    fn far_pixels_are_not_counted() {
         assert_eq!(rate(&[(40.0, Some(80.0)), (60.0, None)]), None);
         assert_eq!(
             rate(&[(60.0, Some(80.0)), (5.0, Some(80.0)), (5.0, Some(6.0))]),

@@ -283,18 +283,18 @@ pub struct IntervalRange {
 mod tests {
     use super::*;
 
-    /// Quantiles of a Laplace distribution with scale `true_scale` as errors, from a network that predicts the scale `said`.
+    /// Quantiles of a Laplace distribution with scale `true_scale` as errors, from a network that predicts the scale `predicted_scale`.
     fn samples(
         n: usize,
         true_scale: f64,
-        said: f64,
+        predicted_scale: f64,
         depth_m: f64,
         drive: usize,
     ) -> Vec<IntervalSample> {
         (0..n)
             .map(|i| IntervalSample {
                 depth_m,
-                scale: said,
+                scale: predicted_scale,
                 error: -true_scale * (1.0 - (i as f64 + 0.5) / n as f64).ln(),
                 drive,
             })
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn of_one_drive_it_is_the_definition() {
+    fn one_drive_gives_the_conformal_quantile() {
         let scores = [0.3, 0.1, 0.9, 0.5, 0.7, 0.2, 0.4, 0.8, 0.6];
         let drive: Vec<IntervalSample> = scores
             .iter()
@@ -321,15 +321,15 @@ mod tests {
     }
 
     #[test]
-    fn a_network_that_is_right_about_itself_needs_no_calibration() {
+    fn a_well_calibrated_network_needs_no_correction() {
         let drive = samples(20_000, 0.2, 0.2, 15.0, 0);
-        let said = IntervalFactors::uncalibrated();
-        let measured = said.measure(&drive).unwrap();
+        let uncalibrated = IntervalFactors::uncalibrated();
+        let measured = uncalibrated.measure(&drive).unwrap();
         assert!(!measured.calibrated);
         let found = IntervalFactors::calibrate(&drive).unwrap();
         for (i, row) in measured.levels.iter().enumerate() {
             assert!((row.coverage - row.level).abs() < 1e-3, "{row:?}");
-            assert!((found.at(15.0)[i] / said.at(15.0)[i] - 1.0).abs() < 2e-3);
+            assert!((found.at(15.0)[i] / uncalibrated.at(15.0)[i] - 1.0).abs() < 2e-3);
         }
         assert!((found.stretch(15.0) - 1.0).abs() < 2e-3);
         // Half of all errors are below b·ln 2: the interval's relative width is 2·sinh(b·ln 2).
@@ -339,7 +339,7 @@ mod tests {
 
     /// Overconfident near, underconfident far: each range is corrected separately, and other drives of the same kind are covered.
     #[test]
-    fn each_range_is_corrected_and_each_drive_counts_as_much() {
+    fn ranges_are_corrected_separately_and_drives_weigh_equally() {
         let drive = |number| {
             let mut all = samples(4_000, 0.2, 0.1, 5.0, number);
             all.extend(samples(2_000, 0.1, 0.3, 30.0, number));
@@ -368,7 +368,7 @@ mod tests {
 
     /// The key is written only if it is true; older files lack it.
     #[test]
-    fn the_pixels_of_the_calibration_are_marked() {
+    fn calibration_on_the_same_pixels_is_marked() {
         let drive = samples(500, 0.2, 0.1, 5.0, 0);
         let factors = IntervalFactors::calibrate(&drive).unwrap();
         let mut measured = factors.measure(&drive).unwrap();
@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_file_says_is_checked() {
+    fn factors_from_a_file_are_validated() {
         let right = IntervalFactors::uncalibrated();
         let mut wrong = right.clone();
         wrong.ranges.pop();

@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_rows_and_the_rest() {
+    fn missing_pixels_use_the_row_mean_then_the_cap() {
         let mut baseline = MeanDepthBaseline::new();
         baseline.add_scan(&grid(&[10.0, 0.0, 0.0, 0.0]));
         baseline.add_scan(&grid(&[20.0, 0.0, 0.0, 0.0]));
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn scans_of_another_size_go_where_their_pixels_lie() {
+    fn scans_of_another_size_are_resampled_by_pixel_centre() {
         let mut baseline = MeanDepthBaseline::new();
         baseline.add_scan(&grid(&[0.0, 0.0, 0.0, 7.0]));
         let mut large = vec![0.0; 16];
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn without_scans_there_is_no_row() {
+    fn without_scans_there_is_no_baseline() {
         assert!(MeanDepthBaseline::new().depth_for(None).is_err());
     }
 }

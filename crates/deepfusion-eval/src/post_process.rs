@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_have_the_command_lines_names() {
+    fn json_has_the_command_lines_names() {
         for how in PostProcess::ALL {
             let written = serde_json::to_string(&how).unwrap();
             assert_eq!(written, format!("{:?}", how.name()));

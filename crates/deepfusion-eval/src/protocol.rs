@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_garg_window_of_a_kitti_image_is_the_fields() {
+    fn the_garg_crop_equals_the_usual_one() {
         // Monodepth2 and its successors print [153, 371) × [44, 1197) for 375×1242.
         assert_eq!(Crop::Garg.window(1242, 375), (153..371, 44..1197));
         assert_eq!(Crop::None.window(1242, 375), (0..375, 0..1242));
@@ -201,14 +201,14 @@ mod tests {
     }
 
     #[test]
-    fn what_a_field_must_be_is_said() {
+    fn expected_settings_as_text() {
         let with = |min_m, cap_m, scaling| Protocol {
             min_m,
             cap_m,
             scaling,
             ..Protocol::default()
         };
-        for (protocol, said) in [
+        for (protocol, text) in [
             (
                 with(0.0, 80.0, Scaling::None),
                 "the minimum depth is 0, expected metres above 0",
@@ -222,7 +222,7 @@ mod tests {
                 "the fixed scale is -1, expected a factor above 0",
             ),
         ] {
-            assert_eq!(protocol.validate().unwrap_err().to_string(), said);
+            assert_eq!(protocol.validate().unwrap_err().to_string(), text);
         }
     }
 }

@@ -183,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_hold_what_lies_in_them() {
+    fn rows_contain_the_samples_of_their_range() {
         let rows = speed_rows(&[(2.0, 0.0), (30.0, 0.1), (26.0, 0.3), (40.0, 0.2)]);
         let of = |row: &SpeedRow| (row.from_mps, row.to_mps, row.n, row.ratio);
         assert_eq!(of(&rows[0]), (0.0, Some(3.0), 1, 1.0));

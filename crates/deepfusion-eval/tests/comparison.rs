@@ -72,7 +72,7 @@ fn collect(paths: &[PathBuf]) -> Vec<Evaluation> {
 }
 
 #[test]
-fn two_runs_on_one_ground_in_every_form() {
+fn two_runs_with_the_same_ground_truth_in_every_format() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let runs = [
@@ -86,7 +86,7 @@ fn two_runs_on_one_ground_in_every_form() {
 }
 
 #[test]
-fn published_rows_in_every_form() {
+fn published_rows_in_every_format() {
     let tables = published_tables().unwrap();
     insta::assert_snapshot!("published_text", tables.to_text());
     let latex = tables.to_latex();
@@ -112,7 +112,7 @@ fn published_rows_in_every_form() {
 #[test]
 fn each_kind_of_truth_has_its_own_published_protocol() {
     let folder = tempfile::tempdir().unwrap();
-    let said = |name: &str, protocol: Protocol| {
+    let notes_of = |name: &str, protocol: Protocol| {
         let run = run(folder.path(), name, "kitti", report(1.1, 0.0, protocol));
         run_tables(&collect(&[run])).tables[0].notes.join("\n")
     };
@@ -122,14 +122,14 @@ fn each_kind_of_truth_has_its_own_published_protocol() {
         ..Protocol::default()
     };
     let benchmark = "improved ground truth: 2 images instead of 652";
-    let whole = said("whole", of(GroundTruth::Annotated, Crop::None));
+    let whole = notes_of("whole", of(GroundTruth::Annotated, Crop::None));
     assert!(whole.contains(&format!("{benchmark}.")), "{whole}");
-    let cropped = said("cropped", of(GroundTruth::Annotated, Crop::Garg));
+    let cropped = notes_of("cropped", of(GroundTruth::Annotated, Crop::Garg));
     assert!(
         cropped.contains(&format!("{benchmark}, Garg's crop instead")),
         "{cropped}"
     );
-    let recorded = said("recorded", of(GroundTruth::Velodyne, Crop::Garg));
+    let recorded = notes_of("recorded", of(GroundTruth::Velodyne, Crop::Garg));
     assert!(
         recorded.contains("Eigen tables: 2 images instead of 697."),
         "{recorded}"
@@ -138,7 +138,7 @@ fn each_kind_of_truth_has_its_own_published_protocol() {
 
 /// Rows of other protocols or other ground truth never share a table.
 #[test]
-fn grounds_are_kept_apart() {
+fn evaluations_with_different_ground_truth_are_kept_apart() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let cap = Protocol {
@@ -186,7 +186,7 @@ fn grounds_are_kept_apart() {
 }
 
 #[test]
-fn plain_files_are_read_and_said_to_be_plain() {
+fn plain_reports_are_read_and_marked_as_plain() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let (mut report, images) = report(1.1, 0.0, Protocol::default());
@@ -234,7 +234,7 @@ fn an_evaluation_of_other_weights_is_reported() {
 }
 
 #[test]
-fn measuring_again_replaces_and_measuring_otherwise_adds() {
+fn the_same_evaluation_is_replaced_and_another_is_added() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let files = || std::fs::read_dir(at.join("run/eval")).unwrap().count();
@@ -251,7 +251,7 @@ fn measuring_again_replaces_and_measuring_otherwise_adds() {
 }
 
 #[test]
-fn what_is_no_evaluation_is_an_error() {
+fn files_that_are_not_evaluations_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let fails = |path: PathBuf| Evaluation::collect(&[path]).unwrap_err();
@@ -295,7 +295,7 @@ fn what_is_no_evaluation_is_an_error() {
 
 /// Everything that affects the result is in the file's name. Options that were not given are neither there nor in the file.
 #[test]
-fn evaluations_that_were_asked_for_otherwise_replace_no_other() {
+fn evaluations_with_other_options_replace_no_other() {
     type Change = fn(&mut MeasuredOn);
     let folder = tempfile::tempdir().unwrap();
     let kept = |change: Change| {
@@ -340,7 +340,7 @@ fn evaluations_that_were_asked_for_otherwise_replace_no_other() {
 
 /// Only evaluations of exactly this checkpoint, on frames known to be unseen, decide how far its metres are trusted.
 #[test]
-fn metres_are_trusted_where_they_were_measured_and_nowhere_else() {
+fn metres_are_trusted_only_where_they_were_measured() {
     type Change = fn(&mut SavedEvaluation);
     let folder = tempfile::tempdir().unwrap();
     let verdict = |name: &str, changes: &[Change]| {

@@ -124,7 +124,7 @@ fn missing_and_extra_names_are_errors() {
 }
 
 #[test]
-fn broken_files_say_what_is_wrong() {
+fn errors_of_broken_files_name_the_problem() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let message = |error: Error| {
@@ -168,10 +168,10 @@ fn an_array_that_claims_too_much_is_an_error() {
     bytes.extend((text.len() as u16).to_le_bytes());
     bytes.extend(text.bytes());
     std::fs::write(at("claims.npy"), &bytes).unwrap();
-    let said = ArraySet::open(&at("claims.npy")).unwrap_err().to_string();
+    let message = ArraySet::open(&at("claims.npy")).unwrap_err().to_string();
     assert!(
-        said.contains("fewer numbers than its header says"),
-        "{said}"
+        message.contains("fewer numbers than its header says"),
+        "{message}"
     );
     let mut archive = zip::ZipWriter::new(std::fs::File::create(at("claims.npz")).unwrap());
     archive
@@ -179,12 +179,12 @@ fn an_array_that_claims_too_much_is_an_error() {
         .unwrap();
     std::io::Write::write_all(&mut archive, &bytes).unwrap();
     archive.finish().unwrap();
-    let said = ArraySet::open(&at("claims.npz"))
+    let message = ArraySet::open(&at("claims.npz"))
         .unwrap()
         .read(0)
         .unwrap_err()
         .to_string();
-    assert!(said.contains("`a` has fewer numbers"), "{said}");
+    assert!(message.contains("`a` has fewer numbers"), "{message}");
 }
 
 #[test]
@@ -227,7 +227,7 @@ fn the_table_with_drawn_points() {
 }
 
 #[test]
-fn images_without_any_ground_truth_are_told_from_masked_ones() {
+fn images_without_ground_truth_are_distinguished_from_masked_ones() {
     let evaluator = Evaluator::new(Protocol::default()).unwrap();
     let error = evaluator.report().unwrap_err().to_string();
     assert_eq!(error, "nothing to compare with: no image has ground truth");

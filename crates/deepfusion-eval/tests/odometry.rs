@@ -43,7 +43,7 @@ fn track(case: &Value) -> TrackPair {
 /// angles of up to √(2 · 1e-9) = 4e-5 rad. The angles of whole stretches are 0.04 rad and more, so they change by 1e-6 of their size. The
 /// angles of single pairs, 0.0035 rad, change by 1e-9 / 0.0035², which is 1e-4 of their size.
 #[test]
-fn numbers_are_evo_s_and_kitti_s() {
+fn numbers_equal_evos_and_kittis() {
     for case in cases() {
         let expected = &case["expected"];
         let report = OdometryReport::of(&[track(&case)], "a file");
@@ -71,7 +71,7 @@ fn numbers_are_evo_s_and_kitti_s() {
 }
 
 #[test]
-fn drives_pool_their_stretches() {
+fn stretches_of_all_drives_are_pooled() {
     let [long, short] = [0, 1].map(|i| track(&cases()[i]));
     let alone = OdometryReport::of(std::slice::from_ref(&long), "a file");
     let both = OdometryReport::of(&[long, short], "a file");
@@ -111,7 +111,7 @@ fn the_table_for_people() {
 
 /// The same trajectory in another world frame scores the same: only motions within a trajectory are compared.
 #[test]
-fn the_world_does_not_matter() {
+fn the_world_frame_does_not_matter() {
     let track = track(&cases()[0]);
     let world = Se3::from_axis_angle([0.3, -1.0, 0.2].into(), [5.0, 6.0, 7.0].into());
     let moved = TrackPair::new(
@@ -129,7 +129,7 @@ fn the_world_does_not_matter() {
 }
 
 #[test]
-fn files_say_what_they_are() {
+fn a_missing_file_is_named_and_poses_are_written_as_kitti_text() {
     let folder = tempfile::tempdir().unwrap();
     let missing = PoseFile::read(&folder.path().join("none.txt")).unwrap_err();
     assert!(missing.to_string().contains("none.txt"));

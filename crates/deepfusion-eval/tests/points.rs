@@ -123,7 +123,7 @@ fn the_seed_decides_which_are_drawn() {
 }
 
 #[test]
-fn the_ground_truth_has_a_name_of_its_own() {
+fn the_hash_depends_on_the_ground_truth_alone() {
     let mut reference = reference();
     let name = |reference: &Value| evaluated(reference, 0, 0).report().unwrap().truth_sha256;
     let first = name(&reference);

@@ -36,7 +36,7 @@ proptest! {
 
     /// Predictions s times as far away: the ratio is 1/s, the bias is ln s, and median scaling undoes s.
     #[test]
-    fn scale_is_seen_and_undone(truth in depths(), pred in depths(), s in 0.2..5.0f64) {
+    fn scale_is_measured_and_removed(truth in depths(), pred in depths(), s in 0.2..5.0f64) {
         let truth = grid(&truth);
         let scaled: Vec<f64> = pred.iter().map(|d| d * s).collect();
         let (one, other) = (report(&Prediction::Depth(grid(&pred)), &truth), report(&Prediction::Depth(grid(&scaled)), &truth));
@@ -112,7 +112,7 @@ fn static_and_moving_pixels_make_up_the_image() {
 }
 
 #[test]
-fn predictions_that_are_no_depth_are_refused_or_counted() {
+fn invalid_predictions_are_refused_or_counted() {
     let truth = grid(&[10.0; WIDTH * HEIGHT]);
     for bad in [f64::NAN, f64::INFINITY, 0.0, -3.0] {
         let mut values = vec![10.0; WIDTH * HEIGHT];

@@ -59,7 +59,7 @@ fn a_boundary_in_the_wrong_place_has_that_distance() {
 }
 
 #[test]
-fn what_is_missed_counts_for_completeness_and_what_is_invented_for_neither() {
+fn missed_boundaries_count_for_completeness_and_invented_ones_for_neither() {
     assert_eq!(errors(|_| 7.0), [10.0; 2]);
     // A second boundary 30 px away.
     let invented = |x: usize| if x < 50 { step(20)(x) } else { 35.0 };
@@ -75,7 +75,7 @@ fn what_is_missed_counts_for_completeness_and_what_is_invented_for_neither() {
 }
 
 #[test]
-fn a_blur_keeps_its_boundary_and_flies() {
+fn blur_keeps_the_boundary_and_gives_flying_pixels() {
     // Between 5 m and 20 m over six pixels; the middle is at the true boundary. The four pixels of a row near the jump, 18 to 21, are all
     // more than 10 % from both depths.
     let blurred = |x: usize| 5.0 + 15.0 * ((x as f64 - 16.5) / 6.0).clamp(0.0, 1.0);
@@ -89,7 +89,7 @@ fn a_blur_keeps_its_boundary_and_flies() {
 }
 
 #[test]
-fn the_truth_enlarged_bilinearly_flies_as_often_as_theory_says() {
+fn bilinear_enlargement_gives_the_expected_share_of_flying_pixels() {
     // Disparities 0.2 and 0.05. Enlarged k times, they blend in the k pixels around the boundary, at (i + ½)/k of the way. Four pixels of
     // each row are near the jump.
     let truth = columns(SIZE, step(24));
@@ -103,7 +103,7 @@ fn the_truth_enlarged_bilinearly_flies_as_often_as_theory_says() {
 }
 
 #[test]
-fn neither_scale_nor_what_is_beyond_the_cap_is_a_matter_of_sharpness() {
+fn scale_and_depth_beyond_the_cap_do_not_affect_sharpness() {
     let exact = Some([0.0; 3]);
     let all = |truth: &Grid, predicted: Grid| {
         let s = sharpness(truth, predicted)?;
@@ -130,7 +130,7 @@ fn neither_scale_nor_what_is_beyond_the_cap_is_a_matter_of_sharpness() {
 }
 
 #[test]
-fn sparse_and_tiny_truth_has_none() {
+fn sparse_or_tiny_truth_gives_no_sharpness() {
     let every = |n: usize| columns(SIZE, move |x| if x % n == 0 { 5.0 } else { f64::NAN });
     let flat = || columns(SIZE, |_| 5.0);
     assert!(sharpness(&every(2), flat()).is_some());
@@ -141,7 +141,7 @@ fn sparse_and_tiny_truth_has_none() {
 }
 
 #[test]
-fn images_are_averaged_where_they_have_what_is_measured() {
+fn means_use_only_images_with_a_value() {
     let scan = columns(SIZE, |x| if x % 9 == 0 { step(20)(x) } else { 0.0 });
     let dense = columns(SIZE, step(20));
     let flat = columns(SIZE, |_| 5.0);

@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn another_size_has_the_depths_of_the_pixels_at_its_middles() {
+    fn resizing_takes_the_depth_at_each_pixels_centre() {
         let map = DepthMap {
             width: 4,
             height: 2,

@@ -242,7 +242,7 @@ mod tests {
         }
 
         #[test]
-        fn any_numbers_end(k in proptest::collection::vec(-10.0..10.0f64, 8), x in -5.0..5.0f64, y in -5.0..5.0f64) {
+        fn any_input_terminates(k in proptest::collection::vec(-10.0..10.0f64, 8), x in -5.0..5.0f64, y in -5.0..5.0f64) {
             let lens = Distortion::from_opencv(&k).unwrap();
             let seen = Vector2::new(x, y);
             if let Some(ideal) = lens.undistort(&seen) {

@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_says_type_order_and_shape() {
+    fn a_header_gives_type_order_and_shape() {
         let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (3, 5), }\n";
         let file = file(text, 60);
         let header = NpyHeader::parse(&file).unwrap();
@@ -142,7 +142,7 @@ mod tests {
 
     /// Shapes whose product exceeds memory or an integer; and text, whose width is not a number's.
     #[test]
-    fn what_no_file_holds_does_not_fit() {
+    fn impossible_sizes_do_not_fit() {
         for (descr, shape) in [
             ("'<f8'", "1099511627776,"),
             ("'<f8'", "4294967296, 4294967296"),

@@ -34,7 +34,7 @@ mod tests {
     use nalgebra::Vector3;
 
     #[test]
-    fn numbers_look_like_kitti_s() {
+    fn numbers_have_kittis_format() {
         assert_eq!(scientific(721.5377), "7.215377000000e+02");
         assert_eq!(scientific(-0.00125), "-1.250000000000e-03");
         assert_eq!(scientific(0.0), "0.000000000000e+00");

@@ -189,7 +189,7 @@ mod tests {
         }
 
         #[test]
-        fn inverse_undoes(omega in vector(1.5), t in vector(30.0), p in vector(50.0)) {
+        fn a_motion_and_its_inverse_cancel(omega in vector(1.5), t in vector(30.0), p in vector(50.0)) {
             let a_from_b = Se3::from_axis_angle(omega, t);
             prop_assert!((a_from_b.inverse().transform(&a_from_b.transform(&p)) - p).norm() < 1e-9);
         }

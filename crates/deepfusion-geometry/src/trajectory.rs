@@ -81,14 +81,14 @@ mod tests {
     }
 
     #[test]
-    fn between_two_poses_is_interpolated() {
+    fn poses_are_interpolated() {
         let pose = straight().at(1.25, 1.0).unwrap();
         assert!((pose.translation().x - 2.5).abs() < 1e-12);
         assert!((pose.axis_angle().z - 0.125).abs() < 1e-12);
     }
 
     #[test]
-    fn outside_the_path_there_is_no_pose() {
+    fn there_is_no_pose_outside_the_trajectory() {
         assert!(straight().at(-0.1, 1.0).is_none());
         assert!(straight().at(2.1, 1.0).is_none());
         assert!(straight().at(2.0, 1.0).is_some());
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_known_of_a_gap() {
+    fn there_is_no_pose_in_a_gap() {
         assert!(straight().at(1.25, 0.9).is_none());
         assert!(straight().at(1.0, 0.9).is_some());
     }

@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn a_colour_picture_is_no_depth() {
+    fn a_colour_picture_is_not_depth() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("colour.png");
         crate::save_png(&image::RgbImage::new(3, 2), &path).unwrap();

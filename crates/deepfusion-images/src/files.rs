@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_was_cut_off_is_noticed_by_its_end() {
+    fn a_truncated_file_is_noticed_by_its_missing_end() {
         let folder = tempfile::tempdir().unwrap();
         let noisy = RgbImage::from_fn(64, 48, |x, y| {
             image::Rgb([

@@ -32,7 +32,7 @@ pub(super) struct KnownCamera {
     make: &'static str,
     /// EXIF's model: the whole, or its beginning if the maker adds a letter per region.
     models: &'static [&'static str],
-    whole: bool,
+    exact_model: bool,
     /// The lens's own focal length, in mm, as in EXIF: it distinguishes the main camera from the others.
     lens_mm: f64,
     view: View,
@@ -42,7 +42,7 @@ const fn apple(models: &'static [&'static str], lens_mm: f64, film_mm: f64) -> K
     KnownCamera {
         make: "Apple",
         models,
-        whole: true,
+        exact_model: true,
         lens_mm,
         view: View::FilmMm(film_mm),
     }
@@ -52,7 +52,7 @@ const fn google(models: &'static [&'static str], lens_mm: f64) -> KnownCamera {
     KnownCamera {
         make: "Google",
         models,
-        whole: true,
+        exact_model: true,
         lens_mm,
         view: View::DiagonalDeg(82.0),
     }
@@ -62,7 +62,7 @@ const fn samsung(models: &'static [&'static str], lens_mm: f64, diagonal_deg: f6
     KnownCamera {
         make: "samsung",
         models,
-        whole: false,
+        exact_model: false,
         lens_mm,
         view: View::DiagonalDeg(diagonal_deg),
     }
@@ -104,7 +104,7 @@ impl KnownCamera {
     pub(super) fn find(make: &str, model: &str, lens_mm: f64) -> Option<&'static Self> {
         KNOWN.iter().find(|known| {
             let named = |name: &&str| {
-                if known.whole {
+                if known.exact_model {
                     model.eq_ignore_ascii_case(name)
                 } else {
                     model.starts_with(*name)
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_lens_tells_the_main_camera_from_the_others() {
+    fn the_lens_distinguishes_the_main_camera_from_the_others() {
         let found =
             |model, lens_mm| KnownCamera::find("Apple", model, lens_mm).map(KnownCamera::film_mm);
         assert_eq!(found("iPhone 12", 4.2), Some(26.0));

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn a_telephone_s_picture_is_upright_and_knows_its_lens() {
+    fn a_phones_picture_is_upright_and_has_a_camera() {
         // 6: the right-hand side of the stored picture is the bottom: rotated by 90 degrees clockwise.
         let photo = load(&jpeg(&[
             (Tag::Orientation, 6),
@@ -121,16 +121,16 @@ mod tests {
     }
 
     #[test]
-    fn a_block_alone_says_the_same_camera() {
+    fn a_separate_exif_block_gives_the_same_camera() {
         let bytes = jpeg(&[(Tag::FocalLengthIn35mmFilm, 26)]);
         // After the marker and the length of APP1; what follows the block is skipped.
-        let said = crate::exif_block_camera(&bytes[6..], (64, 48)).unwrap();
-        assert_eq!(Some(said.intrinsics), load(&bytes).intrinsics);
+        let camera = crate::exif_block_camera(&bytes[6..], (64, 48)).unwrap();
+        assert_eq!(Some(camera.intrinsics), load(&bytes).intrinsics);
         assert_eq!(crate::exif_block_camera(b"no block", (64, 48)), None);
     }
 
     #[test]
-    fn what_is_not_said_or_cannot_be_is_not_known() {
+    fn missing_and_impossible_values_give_no_camera() {
         for fields in [
             &[][..],
             &[(Tag::FocalLengthIn35mmFilm, 0)],

@@ -13,7 +13,7 @@ pub fn resize_rgb(image: &RgbImage, width: u32, height: u32) -> RgbImage {
     }
     let mut resized = RgbImage::new(width, height);
     with_resizer(|resizer| {
-        let pixels = resizer.resize(image, whole(image), width, height);
+        let pixels = resizer.resize(image, whole_image(image), width, height);
         resized.copy_from_slice(pixels);
     });
     resized
@@ -36,7 +36,7 @@ pub fn to_network_input(image: &RgbImage, part: [u32; 4], width: u32, height: u3
 }
 
 /// The x, y, width and height of the whole image.
-fn whole(image: &RgbImage) -> [u32; 4] {
+fn whole_image(image: &RgbImage) -> [u32; 4] {
     [0, 0, image.width(), image.height()]
 }
 

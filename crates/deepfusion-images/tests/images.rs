@@ -150,7 +150,7 @@ proptest! {
 
 /// Pixels outside the part must not bleed in through the filter's margin.
 #[test]
-fn a_part_becomes_the_same_numbers_as_that_part_alone() {
+fn a_part_gives_the_same_input_as_the_cropped_image() {
     let source = load_rgb(&reference("resize_source.png")).unwrap();
     for [x, y, w, h] in [
         [0, 0, 96, 64],

@@ -423,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn a_report_of_an_error_is_no_frame() {
+    fn an_error_report_is_not_a_frame() {
         assert!(candump("(1.0) can0 20000004#0000000000000000").is_none());
         assert!(candump("(1.0) can0 00000004#0000000000000000").is_some());
     }
@@ -454,7 +454,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_message_on_two_buses_one_is_read() {
+    fn one_of_two_buses_is_read() {
         let frame = |ns: i64, channel: &str| Frame {
             ns,
             channel: channel.into(),

@@ -169,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn headers_are_taken_apart() {
+    fn headers_are_split_into_name_and_unit() {
         for (header, name, unit) in [
             ("time_s", "time", Some("s")),
             ("Time (s)", "time", Some("s")),

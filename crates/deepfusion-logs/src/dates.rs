@@ -105,8 +105,8 @@ pub(crate) fn clock_of(word: &str, style: TimeStyle) -> Clock {
 
 /// A time as a user writes it, in nanoseconds on a log's clock: seconds as a number, a date, or a time of day. A date without a zone is
 /// in the log's own zone. A time of day is the one within the log, whose first and last times are `span_ns`, or the nearest to it. For a
-/// log of local dates, `span_ns` is on its clock before [`in_zone`](crate::DriveLog::in_zone) and the result on the one after it, which
-/// is `zone_s` ahead of UTC.
+/// log of local dates, `zone_s` seconds ahead of UTC, `span_ns` is on the local clock and the result in UTC, as after
+/// [`in_zone`](crate::DriveLog::in_zone).
 #[must_use]
 pub fn time_on_clock(word: &str, clock: Clock, span_ns: (i64, i64), zone_s: i64) -> Option<i64> {
     let word = word.trim();
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_numbers_tell_their_unit_or_do_not() {
+    fn the_unit_of_plain_numbers_is_inferred_or_unknown() {
         let style = |words: &[&str], unit| style_of(words, unit);
         assert_eq!(
             style(&["0", "0.5", "1"], None),
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_users_moment_is_on_the_logs_clock() {
+    fn a_users_time_is_on_the_logs_clock() {
         let noon = 1_569_153_600 * SECOND;
         let midnight = noon - 12 * 3600 * SECOND;
         for (word, clock, ns) in [
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_moment_past_midnight_is_on_the_next_day() {
+    fn a_time_past_midnight_is_on_the_next_day() {
         let day = DAY_NS / SECOND;
         for (first_s, word, clock, expected_s) in [
             (day - 10, "00:00:10", Clock::TimeOfDay, day + 10),
@@ -318,14 +318,14 @@ mod tests {
     }
 
     #[test]
-    fn a_moment_of_a_long_day_is_within_the_log() {
+    fn a_time_of_a_long_day_is_within_the_log() {
         let (morning, evening) = (6 * 3600 * SECOND, 20 * 3600 * SECOND);
         let ns = time_on_clock("19:00:00", Clock::Date, (morning, evening), 0);
         assert_eq!(ns, Some(19 * 3600 * SECOND));
     }
 
     #[test]
-    fn a_moment_of_a_local_clock_is_in_its_zone() {
+    fn a_time_of_a_local_clock_is_in_its_zone() {
         let (noon, zone_s) = (1_569_153_600 * SECOND, 7200);
         // The log begins at 14:00 local time.
         let first = noon + 7200 * SECOND;
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn several_rows_of_one_moment_are_no_step() {
+    fn rows_with_equal_times_do_not_affect_the_unit() {
         let words = ["0", "0", "0", "500", "500", "500", "1000", "1000"];
         assert_eq!(style_of(&words, None), None);
         let seconds = ["0", "0", "0.5", "0.5", "1"];

@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_nothing_connects_with_the_video_is_refused() {
+    fn a_clock_unrelated_to_the_videos_is_refused() {
         let out = tempfile::tempdir().unwrap();
         for (clock, first_ns, fine) in [
             (Clock::Free, 200_000_000, true),
@@ -325,13 +325,13 @@ mod tests {
                 fine,
                 "a refused folder leaves nothing behind"
             );
-            let target = target.with_extension("said");
+            let target = target.with_extension("given");
             folder(&log, Some(first_ns)).write(&target).unwrap();
         }
     }
 
     #[test]
-    fn a_time_of_day_is_said_as_one() {
+    fn a_time_of_day_is_printed_as_one() {
         let target = Path::new("nowhere");
         let log = log(Clock::TimeOfDay, 36_061_500_000_000);
         let error = folder(&log, None).check(target).unwrap_err().to_string();
@@ -340,10 +340,10 @@ mod tests {
 
     /// The written table does not mention the time zone.
     #[test]
-    fn dates_without_a_zone_are_said_to_be_taken_for_utc() {
+    fn dates_without_a_zone_give_a_note() {
         let out = tempfile::tempdir().unwrap();
         let images = || Media::Images("images".into());
-        for (name, clock, media, said) in [
+        for (name, clock, media, expected) in [
             ("a", Clock::LocalDate, images(), Some(ClockNote::LocalDates)),
             ("b", Clock::Date, images(), None),
             (
@@ -359,13 +359,13 @@ mod tests {
                 ..folder(&log, None)
             };
             let notes = drive.write(&out.path().join(name)).unwrap();
-            let said: Vec<LogNote> = said.into_iter().map(LogNote::from).collect();
-            assert_eq!(notes, said, "{name}");
+            let expected: Vec<LogNote> = expected.into_iter().map(LogNote::from).collect();
+            assert_eq!(notes, expected, "{name}");
         }
     }
 
     #[test]
-    fn what_is_measured_on_has_the_files_of_the_folder() {
+    fn the_folder_that_is_measured_on_has_all_files() {
         let at = tempfile::tempdir().unwrap();
         let out = at.path().join("drive");
         std::fs::create_dir(&out).unwrap();
@@ -395,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_measured_leaves_no_folder_but_one_with_other_files() {
+    fn a_failed_measurement_removes_the_folder_unless_it_has_other_files() {
         let at = tempfile::tempdir().unwrap();
         let out = at.path().join("drive");
         let log = log(Clock::Date, 1_777_636_800_000_000_000);
@@ -429,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn files_hold_every_digit_and_are_not_written_over() {
+    fn files_keep_every_digit_and_are_not_overwritten() {
         let out = tempfile::tempdir().unwrap();
         let log = log(Clock::Date, 1_777_636_800_123_456_789);
         let notes = folder(&log, Some(-1_500_000_000))

@@ -28,7 +28,7 @@ impl GoproLens {
     /// [`Error::File`]; [`Error::Bytes`] for a video that is cut off or damaged.
     pub fn read(video: &Path) -> Result<Option<Self>> {
         let file = std::fs::File::open(video).map_err(|e| Error::file(video, e))?;
-        // SAFETY: the file is only read. Truncating it meanwhile gives an error of the system's, as with every mapped file.
+        // SAFETY: the file is only read. If it is truncated meanwhile, the system ends the process, as with every mapped file.
         let bytes = unsafe { memmap2::Mmap::map(&file) }.map_err(|e| Error::file(video, e))?;
         Self::find(&bytes).map_err(|broken| broken.of(video))
     }
@@ -39,7 +39,7 @@ impl GoproLens {
         };
         let mut fields = LensFields::default();
         fields.add(&entries(&file[range.clone()], range.start)?, DEEPEST)?;
-        Ok(fields.whole())
+        Ok(fields.into_lens())
     }
 
     /// Whether its pictures are those of a pinhole camera: straight lines stay straight.
@@ -103,7 +103,7 @@ impl LensFields {
         Ok(())
     }
 
-    fn whole(self) -> Option<GoproLens> {
+    fn into_lens(self) -> Option<GoproLens> {
         Some(GoproLens {
             model: self.model?,
             digital: self.digital?,

@@ -35,7 +35,7 @@ struct Readings {
 /// Reads the speeds of the camera's GPS receiver and the turns of its gyroscope.
 pub(crate) fn read(path: &Path) -> Result<DriveLog> {
     let file = std::fs::File::open(path).map_err(|e| Error::file(path, e))?;
-    // SAFETY: the file is only read. Truncating it meanwhile gives an error of the system's, as with every mapped file.
+    // SAFETY: the file is only read. If it is truncated meanwhile, the system ends the process, as with every mapped file.
     let bytes = unsafe { memmap2::Mmap::map(&file) }.map_err(|e| Error::file(path, e))?;
     let broken = |broken: Broken| broken.of(path);
     let Some(payloads) = samples(&bytes, b"gpmd").map_err(broken)? else {

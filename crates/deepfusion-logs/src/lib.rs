@@ -8,7 +8,7 @@
 //! |---|---|
 //! | GPX, NMEA | Doppler speed if most fixes have one, else smoothed positions |
 //! | Tables (`.csv`, `.tsv`, `.txt`): Torque, Sensor Logger, phyphox, any other | names and units of the columns |
-//! | Car Scanner (one value a row) | the rows of the vehicle's speed |
+//! | Car Scanner (one value per row) | the rows of the vehicle's speed |
 //! | Google's GnssLogger | its `Fix` rows |
 //! | GoPro's MP4 | the `gpmd` track: GPS5 or GPS9, gyroscope and gravity |
 //! | `candump`, Vector ASC and BLF | a signal of a DBC file |

@@ -98,7 +98,7 @@ impl fmt::Display for Format {
             Self::Gpx => "GPX track",
             Self::Nmea => "NMEA sentences",
             Self::Table => "table",
-            Self::TallTable => "table of one value a row (Car Scanner)",
+            Self::TallTable => "table with one value per row (Car Scanner)",
             Self::ExportFolder => "phone's export folder",
             Self::GnssLogger => "GnssLogger text",
             Self::Gpmf => "GoPro video",

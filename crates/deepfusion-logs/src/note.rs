@@ -52,7 +52,7 @@ mod tests {
 
     /// One of each kind. All notes of a kind are tested beside it.
     #[test]
-    fn a_note_says_what_its_kind_says() {
+    fn a_note_prints_the_text_of_its_kind() {
         let of_table = LogNote::from(TableNote::HeaderAgain { more: 1 });
         let notes: [LogNote; 7] = [
             of_table.clone(),
@@ -69,7 +69,7 @@ mod tests {
                 note: of_table.into(),
             },
         ];
-        let said = [
+        let texts = [
             "the header is repeated once among the rows",
             "speeds of the Fix rows of the GPS provider",
             "left out, as not later than the frame before: 1 frame",
@@ -78,6 +78,6 @@ mod tests {
             "the log's dates have no time zone and are taken as UTC, as the video's are",
             "Location.csv: the header is repeated once among the rows",
         ];
-        assert_eq!(notes.map(|note| note.to_string()), said);
+        assert_eq!(notes.map(|note| note.to_string()), texts);
     }
 }

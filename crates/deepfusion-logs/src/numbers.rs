@@ -37,7 +37,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_commas_and_words_for_nothing() {
+    fn decimal_points_commas_and_missing_values() {
         assert_eq!(cell(" 12.5 ", false), Cell::Number(12.5));
         assert_eq!(cell("\"12,5\"", true), Cell::Number(12.5));
         assert_eq!(cell("1.234,5", true), Cell::Number(1234.5));

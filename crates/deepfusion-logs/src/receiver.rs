@@ -41,9 +41,9 @@ fn sentences(bytes: &[u8]) -> std::result::Result<Vec<TimedFix>, BadLine> {
         let bad = |problem: NmeaProblem| BadLine::new(number, "RMC", problem);
         let refused = |e: nmea::Error<'_>| bad(NmeaProblem::Sentence(e.to_string()));
         let sentence = nmea::parse_nmea_sentence(text).map_err(refused)?;
-        let (found, said) = (sentence.calc_checksum(), sentence.checksum);
-        if found != said {
-            return Err(bad(NmeaProblem::Checksum { found, said }));
+        let (found, stated) = (sentence.calc_checksum(), sentence.checksum);
+        if found != stated {
+            return Err(bad(NmeaProblem::Checksum { found, stated }));
         }
         let rmc = parse_rmc(sentence).map_err(refused)?;
         if rmc.status_of_fix == RmcStatusOfFix::Invalid {

@@ -158,7 +158,7 @@ mod tests {
 
     /// Wherever the clock jumps, only that moment is lost.
     #[test]
-    fn a_leap_ahead_costs_no_row_after_it() {
+    fn a_jump_ahead_costs_no_later_row() {
         let good: Vec<i64> = (0..400).collect();
         for at in [0, 1, 200, 397, 398] {
             let mut times = good.clone();
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_in_no_order_is_refused_by_its_first_row() {
+    fn unordered_rows_are_an_error_at_the_first_one() {
         let times: Vec<i64> = (0..100).chain(0..100).collect();
         let error = sorted_out(&times).1.unwrap_err().to_string();
         assert!(error.contains("99 s before the row above"), "{error}");
@@ -190,7 +190,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_kept_is_in_order_and_what_is_in_order_is_kept(times in prop::collection::vec(any::<i64>(), 0..60)) {
+        fn kept_rows_are_in_order_and_ordered_rows_are_kept(times in prop::collection::vec(any::<i64>(), 0..60)) {
             let (kept, _) = sorted_out(&times);
             prop_assert!(kept.is_sorted());
             prop_assert!(times.is_empty() || !kept.is_empty());

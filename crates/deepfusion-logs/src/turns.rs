@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_known_is_said() {
+    fn an_unknown_sign_or_axis_gives_a_note() {
         let (rates, accelerations, _, _) = drive(1.0);
         let (turns, note) = yaw_rates(&rates, &accelerations, &[]);
         assert!(!turns.is_empty());

@@ -56,7 +56,7 @@ fn a_binary_log_has_the_speeds_of_the_same_frames_as_text() {
 }
 
 #[test]
-fn it_is_known_by_its_first_bytes() {
+fn a_binary_log_is_recognised_by_its_first_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("trace.bin");
     std::fs::copy(fixture("vector.blf"), &path).unwrap();
@@ -64,7 +64,7 @@ fn it_is_known_by_its_first_bytes() {
 }
 
 #[test]
-fn a_file_that_was_cut_off_says_where() {
+fn a_truncated_file_is_an_error_with_its_position() {
     for name in FILES {
         let bytes = std::fs::read(fixture(name)).unwrap();
         for length in (0..bytes.len()).step_by(61) {

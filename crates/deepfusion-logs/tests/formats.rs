@@ -84,8 +84,8 @@ fn a_row_that_goes_back_is_left_out() {
     let log = read_with(&[50]).unwrap();
     assert_eq!((log.speeds.len(), log.yaw_rates.len()), (199, 199));
     assert!(log.speeds.iter().all(|speed| speed.mps != 50.0));
-    let said = LogNote::from(TableNote::Backwards { back: 1, rows: 200 });
-    let times = log.notes.iter().filter(|note| **note == said);
+    let expected = LogNote::from(TableNote::Backwards { back: 1, rows: 200 });
+    let times = log.notes.iter().filter(|note| **note == expected);
     assert_eq!(times.count(), 1, "{:?}", log.notes);
     let error = read_with(&[50, 60, 70]).unwrap_err().to_string();
     assert!(error.contains("trip.csv:52: "), "{error}");
@@ -94,7 +94,7 @@ fn a_row_that_goes_back_is_left_out() {
 
 /// A clock that jumps ahead for a row, among the last of the table: this row is left out, not those after it.
 #[test]
-fn a_row_that_leaps_ahead_costs_itself_alone() {
+fn only_the_row_that_jumps_ahead_is_lost() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("trip.csv");
     let row = |i: i32| {
@@ -107,16 +107,16 @@ fn a_row_that_leaps_ahead_costs_itself_alone() {
     assert_eq!((log.speeds.len(), log.yaw_rates.len()), (199, 199));
     assert!(log.speeds.iter().all(|speed| speed.mps != 197.0));
     assert_eq!(log.speeds[198].mps, 199.0);
-    let said = LogNote::from(TableNote::Ahead {
+    let expected = LogNote::from(TableNote::Ahead {
         ahead: 1,
         rows: 200,
     });
-    let times = log.notes.iter().filter(|note| **note == said);
+    let times = log.notes.iter().filter(|note| **note == expected);
     assert_eq!(times.count(), 1, "{:?}", log.notes);
 }
 
 #[test]
-fn a_tables_yaw_rate_is_read_where_its_unit_is_said() {
+fn a_tables_yaw_rate_is_read_if_its_unit_is_given() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("speed.csv");
     let read_with = |header: &str, factor: f64| {
@@ -185,12 +185,12 @@ fn torque_has_the_vehicles_speed_and_a_receivers() {
 }
 
 #[test]
-fn car_scanner_has_a_value_a_row_and_decimal_commas() {
+fn car_scanner_has_one_value_per_row_and_decimal_commas() {
     let log = plain("car_scanner.csv");
     assert_eq!((log.format, log.clock), (Format::TallTable, Clock::Free));
     speeds_are_true(&log, 43_200_250_000_000, 49, 1e-4);
-    let said = log.notes[0].to_string();
-    assert!(said.contains("'Vehicle speed' in mph"), "{said}");
+    let note = log.notes[0].to_string();
+    assert!(note.contains("'Vehicle speed' in mph"), "{note}");
 }
 
 #[test]
@@ -233,7 +233,7 @@ fn phyphox_counts_from_its_start() {
 }
 
 #[test]
-fn gnss_logger_is_read_from_its_satellites_alone() {
+fn gnss_logger_uses_only_fixes_from_gps() {
     let log = plain("gnss_log.txt");
     assert_eq!((log.format, log.clock), (Format::GnssLogger, Clock::Date));
     speeds_are_true(&log, NOON_NS, 13, 1e-4);
@@ -241,7 +241,7 @@ fn gnss_logger_is_read_from_its_satellites_alone() {
 }
 
 #[test]
-fn a_table_of_anybodys_needs_to_be_told_its_columns() {
+fn an_unknown_table_needs_the_names_of_its_columns() {
     let path = fixture("german.csv");
     let error = read(&path, &ReadOptions::default())
         .unwrap_err()
@@ -273,7 +273,7 @@ fn a_table_of_anybodys_needs_to_be_told_its_columns() {
 
 /// Speeds in UTC, and turns on a local clock.
 #[test]
-fn turns_of_another_zone_are_not_taken_for_utc_without_a_word() {
+fn turns_without_a_zone_are_taken_as_utc_with_a_note() {
     let folder = tempfile::tempdir().unwrap();
     let turns = folder.path().join("turns.csv");
     let row = |i: i32| format!("2026-05-01 14:00:{i:02},8,0.1\n");
@@ -285,13 +285,13 @@ fn turns_of_another_zone_are_not_taken_for_utc_without_a_word() {
         let read = read_all(&logs, &ReadOptions::default(), zone_s).unwrap();
         read.unwrap().0
     };
-    let said = LogNote::OfFile {
+    let expected = LogNote::OfFile {
         file: "turns.csv".into(),
         note: Box::new(ClockNote::LocalDates.into()),
     };
-    assert!(read(None).notes.contains(&said));
+    assert!(read(None).notes.contains(&expected));
     let in_zone = read(Some(7200));
-    assert!(!in_zone.notes.contains(&said));
+    assert!(!in_zone.notes.contains(&expected));
     assert_eq!(in_zone.yaw_rates[0].ns, NOON_NS);
 }
 
@@ -356,7 +356,7 @@ fn a_gopros_video_holds_its_own_log() {
 }
 
 #[test]
-fn a_gopros_video_says_through_which_lens_it_was_filmed() {
+fn a_gopros_video_names_its_lens() {
     let lens = GoproLens::read(&fixture("gopro.mp4")).unwrap().unwrap();
     assert_eq!(lens.model, "HERO11 Black");
     assert_eq!((lens.digital, lens.size), ('L', (1920, 1080)));
@@ -464,8 +464,8 @@ fn damaged_logs_are_named_by_line_and_column() {
             let path = folder.path().join(name);
             std::fs::write(&path, text).unwrap();
             let log = read(&path, &ReadOptions::default()).unwrap();
-            let said = log.notes[0].to_string();
-            assert!(said.contains(expected), "{said}");
+            let note = log.notes[0].to_string();
+            assert!(note.contains(expected), "{note}");
             continue;
         }
         let error = changed(name, |text| text.replace(from, to));
@@ -474,7 +474,7 @@ fn damaged_logs_are_named_by_line_and_column() {
 }
 
 #[test]
-fn a_video_that_was_cut_off_says_where() {
+fn a_truncated_video_is_an_error_with_its_position() {
     let bytes = std::fs::read(fixture("gopro.mp4")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cut.mp4");

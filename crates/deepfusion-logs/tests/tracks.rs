@@ -37,8 +37,8 @@ fn a_gpx_track_gives_speeds_at_its_dates() {
     // A degree of latitude is 111.2 km there: 10 m/s.
     let log = read("a.gpx", &track(30, 10.0 / 111_206.0, |_| String::new())).unwrap();
     assert_eq!(log.speeds.len(), 30);
-    let said = log.notes[0].to_string();
-    assert!(said.contains("from its positions"), "{said}");
+    let note = log.notes[0].to_string();
+    assert!(note.contains("from its positions"), "{note}");
     assert_eq!(log.speeds[0].ns, 1_777_636_800_250_000_000);
     assert_eq!(log.speeds[1].ns - log.speeds[0].ns, 1_000_000_000);
     for speed in &log.speeds {
@@ -47,7 +47,7 @@ fn a_gpx_track_gives_speeds_at_its_dates() {
 }
 
 #[test]
-fn a_speed_in_an_extension_counts() {
+fn a_speed_in_an_extension_is_used() {
     let extension = |i: usize| {
         format!(
             "<extensions><gpxtpx:TrackPointExtension><gpxtpx:speed>{}.5</gpxtpx:speed></gpxtpx:TrackPointExtension></extensions>",
@@ -55,15 +55,15 @@ fn a_speed_in_an_extension_counts() {
         )
     };
     let log = read("a.gpx", &track(5, 1e-4, extension)).unwrap();
-    let said = log.notes[0].to_string();
-    assert!(said.contains("as the receiver measured"), "{said}");
+    let note = log.notes[0].to_string();
+    assert!(note.contains("as the receiver measured"), "{note}");
     let speeds: Vec<f64> = log.speeds.iter().map(|s| s.mps).collect();
     assert_eq!(speeds, [0.5, 1.5, 2.5, 3.5, 4.5]);
 }
 
 /// iOS writes -1 for an unknown speed; OsmAnd writes none if it is 0.
 #[test]
-fn a_point_without_a_speed_leaves_the_others_theirs() {
+fn a_point_without_a_speed_does_not_discard_the_others() {
     for unknown in ["<speed>-1</speed>", ""] {
         let speed = |i: usize| {
             let own = format!("<speed>{i}.5</speed>");
@@ -72,14 +72,14 @@ fn a_point_without_a_speed_leaves_the_others_theirs() {
         let log = read("a.gpx", &track(5, 0.0, speed)).unwrap();
         let speeds: Vec<f64> = log.speeds.iter().map(|s| s.mps).collect();
         assert_eq!(speeds, [0.0, 1.5, 2.5, 3.5, 4.5], "{unknown}");
-        let said: Vec<String> = log.notes.iter().map(ToString::to_string).collect();
-        assert!(said[0].contains("as the receiver measured"), "{said:?}");
-        assert!(said[1].ends_with("1 of 5 fixes"), "{said:?}");
+        let notes: Vec<String> = log.notes.iter().map(ToString::to_string).collect();
+        assert!(notes[0].contains("as the receiver measured"), "{notes:?}");
+        assert!(notes[1].ends_with("1 of 5 fixes"), "{notes:?}");
     }
 }
 
 #[test]
-fn what_is_wrong_with_a_track_is_named_by_line() {
+fn errors_in_a_track_name_the_line() {
     let good = track(5, 1e-4, |_| String::new());
     for (bad, expected) in [
         (

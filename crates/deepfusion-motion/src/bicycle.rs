@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn the_offset_is_straight_ahead_and_the_sign_can_be_turned() {
+    fn the_offset_means_straight_ahead_and_the_sign_can_be_reversed() {
         let mut bicycle = Bicycle::new(2.7).with_steering_wheel(-15.0);
         bicycle.steering_offset_rad = 0.1;
         assert!(bicycle.yaw_rate(20.0, 0.1).abs() < 1e-15);
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_of_either_is_a_gap() {
+    fn a_gap_in_either_signal_is_a_gap() {
         let gappy = Signal::new(
             (0..=100)
                 .filter(|i| !(40..60).contains(i))
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_vehicles_are_named() {
+    fn implausible_vehicles_are_refused_by_field() {
         let bad = [
             (Bicycle::new(f64::NAN), "wheelbase_m"),
             (Bicycle::new(0.0), "wheelbase_m"),

@@ -151,7 +151,7 @@ impl FusedTrack {
             let known = !imu.standstills().is_empty() || config.imu.gyro_bias_radps.is_some();
             let usual_bias = if known { KNOWN_BIAS } else { UNKNOWN_BIAS };
             let found = yaw_errors(imu.yaw_rate(), steering, speed, bicycle, usual_bias);
-            freed = Some(freed_of(&found, imu.yaw_rate(), steering, speed));
+            freed = Some(without_errors(&found, imu.yaw_rate(), steering, speed));
         }
         Ok(Self {
             speed_mps: speed.clone(),
@@ -215,16 +215,20 @@ impl FusedTrack {
         let (mut s, mut g, mut ss, mut sg) = (0.0, 0.0, 0.0, 0.0);
         for (times, rate) in gyro.times_s().windows(2).zip(gyro.values()) {
             let step_s = times[1] - times[0];
-            let (Some(said), Some(speed)) = (steering.at(times[0]), self.speed_at(times[0])) else {
+            let (Some(steered), Some(speed)) = (steering.at(times[0]), self.speed_at(times[0]))
+            else {
                 continue;
             };
             if step_s > gyro.max_gap_s() || speed.abs() > most_mps {
                 continue;
             }
             n += step_s;
-            (s, g) = (s + said * step_s, g + rate * step_s);
-            (ss, sg) = (ss + said * said * step_s, sg + said * rate * step_s);
-            if said.abs() > TURNING_RADPS {
+            (s, g) = (s + steered * step_s, g + rate * step_s);
+            (ss, sg) = (
+                ss + steered * steered * step_s,
+                sg + steered * rate * step_s,
+            );
+            if steered.abs() > TURNING_RADPS {
                 turning_s += step_s;
             }
         }
@@ -291,7 +295,7 @@ impl FusedTrack {
 }
 
 /// The yaw rates of gyro and steering without the errors found in them.
-fn freed_of(
+fn without_errors(
     found: &[DrivingBias],
     gyro: &Signal,
     steering: &Signal,

@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_shows_nothing() {
+    fn an_untextured_wall_gives_no_motion() {
         let wall = GreyFrame::from_bytes(0.0, 160, 48, &[90; 160 * 48]).unwrap();
         assert_eq!(ImageMotion::between(&wall, &wall), None);
         assert_eq!(
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_that_do_not_fit_are_refused() {
+    fn images_of_wrong_sizes_are_refused() {
         assert!(GreyFrame::from_bytes(0.0, 160, 48, &[0; 100]).is_err());
         assert!(GreyFrame::from_bytes(0.0, 8, 8, &[0; 64]).is_err());
         assert!(GreyFrame::from_bytes(0.0, usize::MAX, 48, &[0; 64]).is_err());

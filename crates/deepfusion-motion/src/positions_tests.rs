@@ -82,7 +82,7 @@ fn a_track_gives_its_speeds() {
 }
 
 #[test]
-fn a_time_far_ahead_does_not_take_the_rest_away() {
+fn a_time_that_jumps_ahead_does_not_drop_later_fixes() {
     let (mut fixes, _) = drive(0.3);
     for glitch in [0, 7] {
         let (own, all) = (fixes[glitch].time_s, fixes.len());
@@ -93,7 +93,7 @@ fn a_time_far_ahead_does_not_take_the_rest_away() {
 }
 
 #[test]
-fn leaps_do_not_become_speed() {
+fn jumps_of_position_do_not_become_speed() {
     let (mut fixes, truth) = drive(0.3);
     for i in [17, 40, 41, 90] {
         fixes[i].latitude_deg += 4e-4;
@@ -106,7 +106,7 @@ fn leaps_do_not_become_speed() {
 }
 
 #[test]
-fn a_receivers_own_speed_counts_and_gaps_part_the_track() {
+fn the_receivers_speed_is_used_and_gaps_split_the_track() {
     let fix = |time_s: f64, speed: f64| Fix {
         time_s,
         latitude_deg: 49.0,
@@ -156,7 +156,7 @@ fn stop_and_go(speed_mps: impl Fn(usize) -> Option<f64>) -> Vec<Fix> {
 }
 
 #[test]
-fn a_fix_that_says_no_speed_does_not_take_the_others_away() {
+fn a_fix_without_a_speed_does_not_discard_the_others() {
     // An app that writes only speeds above 0, and one fix without a speed in between.
     let fixes = stop_and_go(|i| (i > 10 && i != 15).then_some(10.25));
     let found = speeds_of_fixes(&fixes);
@@ -175,7 +175,7 @@ fn a_fix_that_says_no_speed_does_not_take_the_others_away() {
 }
 
 #[test]
-fn few_measured_speeds_do_not_count() {
+fn few_measured_speeds_are_ignored() {
     let found = speeds_of_fixes(&stop_and_go(|i| (i > 16).then_some(10.25)));
     assert_eq!(found.len(), 20);
     let of_positions = |f: &FixSpeed| f.source == FixSpeedSource::Positions;

@@ -352,7 +352,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_mean_about_each_pixel_is_taken_off() {
+    fn the_local_mean_is_subtracted() {
         let (width, height) = (23, 11);
         let data: Vec<f32> = (0..width * height)
             .map(|i| (i * 7919 % 256) as f32)

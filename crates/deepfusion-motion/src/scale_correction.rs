@@ -49,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_followed_slowly_and_left_again() {
+    fn an_alarm_is_followed_slowly_and_undone_after_it() {
         let mut correction = ScaleCorrection::default();
         correction.follow(&reading(ScaleState::Learning, 1.3));
         correction.follow(&reading(ScaleState::Steady, 1.04));

@@ -186,7 +186,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn what_is_no_sample_is_dropped_and_counted() {
+    fn invalid_samples_are_dropped_and_counted() {
         let signal = Signal::new([
             (f64::NAN, 1.0),
             (0.0, 1.0),
@@ -234,7 +234,7 @@ mod tests {
     proptest! {
         /// For any input the output is a finite number or `None`.
         #[test]
-        fn never_made_up(samples in proptest::collection::vec((any::<f64>(), -1e6..1e6f64), 0..40), t in any::<f64>(), dt in 0.0..1.0f64) {
+        fn results_are_finite_or_none(samples in proptest::collection::vec((any::<f64>(), -1e6..1e6f64), 0..40), t in any::<f64>(), dt in 0.0..1.0f64) {
             let signal = Signal::new(samples);
             prop_assert!(signal.times_s().windows(2).all(|w| w[0] < w[1]));
             prop_assert!(signal.at(t).is_none_or(f64::is_finite));
@@ -243,7 +243,7 @@ mod tests {
 
         /// Integrals over neighbouring intervals add up.
         #[test]
-        fn integrals_join(values in proptest::collection::vec(-20.0..20.0f64, 12), cut in 0.0..1.1f64) {
+        fn integrals_of_adjacent_intervals_add_up(values in proptest::collection::vec(-20.0..20.0f64, 12), cut in 0.0..1.1f64) {
             let signal = Signal::new(values.iter().enumerate().map(|(i, v)| (i as f64 * 0.1, *v)));
             let integral = |a, b| signal.integral(a, b).unwrap();
             prop_assert!((integral(0.0, cut) + integral(cut, 1.1) - integral(0.0, 1.1)).abs() < 1e-9);

@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_nose_that_dips_turns_the_camera_down_and_leaves_its_place() {
+    fn pitching_down_rotates_the_camera_without_moving_it() {
         let motion = VehicleMotion {
             distance_m: 2.0,
             yaw_rad: 0.1,
@@ -137,7 +137,7 @@ mod tests {
     proptest! {
         /// Two pieces of an arc of constant curvature compose to the whole arc.
         #[test]
-        fn arcs_join(d in 0.1..5.0f64, yaw in -1.0..1.0f64, part in 0.05..0.95f64) {
+        fn consecutive_arcs_compose(d in 0.1..5.0f64, yaw in -1.0..1.0f64, part in 0.05..0.95f64) {
             let piece = |f: f64| VehicleMotion { distance_m: d * f, yaw_rad: yaw * f, tilt_rad: [0.0; 2] }.vehicle0_from_vehicle1();
             let joined = piece(part) * piece(1.0 - part);
             prop_assert!((joined.translation() - piece(1.0).translation()).norm() < 1e-9);

@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn an_accelerating_car_goes_half_a_t_squared() {
-        // v = 3 t sampled unevenly: for which the trapezoidal rule is exact.
+        // v = 3 t, sampled unevenly: the trapezoidal rule is exact for it.
         let samples: Vec<_> = [0.0, 0.1, 0.25, 0.3, 0.5]
             .iter()
             .map(|t| (*t, 3.0 * t, -0.2))
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_and_ends_are_not_made_up() {
+    fn there_is_no_motion_in_gaps_and_beyond_the_ends() {
         let track = VehicleTrack::new(&[
             (0.0, 5.0, 0.0),
             (0.1, 5.0, 0.0),
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_with_a_bad_value_is_none() {
+    fn a_sample_with_an_invalid_value_is_dropped() {
         let track = VehicleTrack::new(&[
             (0.0, 5.0, 0.0),
             (0.1, f64::NAN, 0.0),
@@ -211,7 +211,7 @@ mod tests {
     proptest! {
         /// Integrals over neighbouring intervals add up.
         #[test]
-        fn integrals_join(speeds in proptest::collection::vec(0.0..20.0f64, 12), cut in 0.05..1.0f64) {
+        fn integrals_of_adjacent_intervals_add_up(speeds in proptest::collection::vec(0.0..20.0f64, 12), cut in 0.05..1.0f64) {
             let samples: Vec<_> = speeds.iter().enumerate().map(|(i, v)| (i as f64 * 0.1, *v, v * 0.01)).collect();
             let track = VehicleTrack::new(&samples);
             let distance = |a, b| track.motion(a, b).unwrap().distance_m;

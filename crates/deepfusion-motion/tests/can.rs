@@ -28,7 +28,7 @@ fn bytes(hex: &str) -> Vec<u8> {
 }
 
 #[test]
-fn every_signal_is_what_cantools_decodes() {
+fn every_signal_equals_cantools() {
     let frames: Vec<Frame> = serde_json::from_str(include_str!("reference/dbc.json")).unwrap();
     let dbc = Dbc::parse(DBC).unwrap();
     let (mut there, mut absent) = (0, 0);
@@ -63,11 +63,11 @@ fn every_signal_is_what_cantools_decodes() {
 }
 
 #[test]
-fn names_units_and_what_is_not_there() {
+fn names_units_and_unknown_signals() {
     let dbc = Dbc::parse(DBC).unwrap();
     assert!(dbc.names().any(|n| n == "STEER_ANGLE_SENSOR.STEER_ANGLE"));
     assert_eq!(dbc.unit("POWERTRAIN_DATA.XMISSION_SPEED"), Some("km/h"));
-    for (name, said) in [
+    for (name, message) in [
         ("XMISSION_SPEED", "Message.Signal"),
         ("POWERTRAIN.XMISSION_SPEED", "the file has POWERTRAIN_DATA"),
         (
@@ -77,7 +77,7 @@ fn names_units_and_what_is_not_there() {
     ] {
         let error = dbc.signal(name).unwrap_err();
         assert!(matches!(error, Error::NoSignal { .. }));
-        assert!(error.to_string().contains(said), "{error}");
+        assert!(error.to_string().contains(message), "{error}");
     }
 }
 
@@ -115,8 +115,8 @@ fn a_signal_beyond_the_longest_frame_is_refused() {
         matches!(&error, Error::Layout { field: "start_bit", expected: e, .. } if *e == expected),
         "{error}"
     );
-    let said = "start_bit is 501, expected a position that ends within 64 bytes";
-    assert!(error.to_string().ends_with(said), "{error}");
+    let message = "start_bit is 501, expected a position that ends within 64 bytes";
+    assert!(error.to_string().ends_with(message), "{error}");
 }
 
 proptest! {

@@ -175,7 +175,7 @@ fn outliers_do_not_move_the_fit() {
 }
 
 #[test]
-fn at_one_speed_zero_and_bias_cannot_be_separated_but_the_product_can() {
+fn at_constant_speed_the_product_is_known_but_zero_and_bias_are_not_separated() {
     let drive = Drive::new(&car(), 120.0, |_| 10.0, |t| 0.06 * (0.4 * t).sin());
     let config = IdentifyConfig {
         steering_ratio: Some(15.4),
@@ -204,7 +204,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
     /// Any car's parking is identified within 3 %, or declared unidentifiable.
     #[test]
-    fn other_cars(wheelbase in 2.3..3.6f64, ratio in 12.0..20.0f64, offset in -0.2..0.2f64) {
+    fn any_car_is_identified_or_declared_unidentifiable(wheelbase in 2.3..3.6f64, ratio in 12.0..20.0f64, offset in -0.2..0.2f64) {
         let car = Bicycle { steering_offset_rad: offset, ..Bicycle::new(wheelbase).with_steering_wheel(ratio) };
         if let Ok(found) = parking(&car).identify(&IdentifyConfig { largest_relative_error: 0.01, ..IdentifyConfig::default() }) {
             prop_assert!((found.wheelbase_m.value / wheelbase - 1.0).abs() < 0.03, "{found:?}");

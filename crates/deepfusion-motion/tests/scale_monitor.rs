@@ -143,7 +143,7 @@ fn clean_drives_are_silent_and_a_zoom_is_noticed() {
 
 /// Speeds in another unit, and another resolution, lead to heights outside those tried around the usual one.
 #[test]
-fn a_change_by_more_than_is_tried_is_one_all_the_same() {
+fn a_change_beyond_the_heights_tried_is_noticed() {
     let drive = drive(81);
     for (zoom, speed, expected) in [(1.0, 3.6, 3.6), (1.6, 1.0, 1.6)] {
         let all = readings(&drive, zoom, speed, ScaleMonitorConfig::default());
@@ -189,7 +189,7 @@ fn a_height_that_was_measured_needs_no_learning() {
 }
 
 #[test]
-fn the_network_s_metres_stand_beside_the_vehicle_s() {
+fn the_networks_metres_are_compared_with_the_vehicles() {
     let drive = drive(81);
     let mut monitor = ScaleMonitor::new(ScaleMonitorConfig::default());
     let mut last = None;

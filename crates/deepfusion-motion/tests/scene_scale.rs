@@ -79,7 +79,7 @@ fn as_measured(motion: &Se3) -> Se3 {
 }
 
 #[test]
-fn a_turn_and_a_way_are_found_in_units_of_the_depth() {
+fn rotation_and_translation_are_found_in_units_of_the_depth() {
     let street = Street::new(3);
     for (source, target) in [(20, 22), (40, 43)] {
         let ((before, _), (grey, depth)) = (street.frame(source), street.frame(target));
@@ -106,7 +106,7 @@ fn a_turn_and_a_way_are_found_in_units_of_the_depth() {
 }
 
 #[test]
-fn patches_give_the_factor_that_the_depth_was_given() {
+fn patches_recover_the_factor_applied_to_the_depth() {
     let street = Street::new(4);
     let (target, depth) = street.frame(40);
     let before: Vec<(GreyPyramid, Se3)> = [38, 34, 28]
@@ -167,7 +167,7 @@ fn a_wrong_focal_length_does_not_hide_a_wrong_depth() {
 }
 
 #[test]
-fn images_without_texture_say_nothing() {
+fn images_without_texture_give_nothing() {
     let flat = GreyPyramid::new(GreyImage {
         width: 128,
         height: 64,

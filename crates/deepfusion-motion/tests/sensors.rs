@@ -102,7 +102,7 @@ fn distance_and_heading_survive_slopes_biases_and_any_mount() {
 }
 
 #[test]
-fn a_bias_that_is_known_helps_where_nothing_stands() {
+fn a_known_bias_helps_without_a_standstill() {
     let samples: Vec<ImuSample> = imu(&Se3::identity()).split_off(1500);
     let samples = &samples[..4000];
     let heading_error = |config: &ImuConfig| {
@@ -119,7 +119,7 @@ fn a_bias_that_is_known_helps_where_nothing_stands() {
 }
 
 #[test]
-fn a_unit_that_is_not_what_the_configuration_says_is_refused() {
+fn a_unit_that_contradicts_its_configuration_is_refused() {
     let refused = |samples: &[ImuSample]| {
         let error = ImuTrack::new(samples, &speed_signal(), &ImuConfig::default()).unwrap_err();
         (error.hint().unwrap(), error)
@@ -411,7 +411,7 @@ fn opposite_signs_of_steering_and_gyro_are_refused() {
 }
 
 #[test]
-fn a_model_answers_alike_whatever_it_holds() {
+fn a_fused_model_answers_like_its_track() {
     let track = FusedTrack::new(&all(), &config()).unwrap();
     let model = MotionModel::from(track.clone());
     assert_eq!(model.motion(20.0, 20.5), track.motion(20.0, 20.5));
@@ -420,7 +420,7 @@ fn a_model_answers_alike_whatever_it_holds() {
 }
 
 #[test]
-fn the_configuration_reads_from_a_file_and_names_what_is_wrong() {
+fn the_configuration_is_read_from_a_file_and_errors_name_the_field() {
     for file in ["rav4_2017", "civic_2016"] {
         let path = format!("{}/examples/{file}.toml", env!("CARGO_MANIFEST_DIR"));
         let config: MotionConfig = toml::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
@@ -446,7 +446,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     /// Whatever a recorder writes, the result is a finite motion, `None`, or an error.
     #[test]
-    fn never_nan_never_a_panic(
+    fn any_input_gives_neither_nan_nor_panic(
         times in proptest::collection::vec(prop_oneof![8 => 0.0..5.0f64, 1 => any::<f64>()], 0..80),
         values in proptest::collection::vec(prop_oneof![8 => -20.0..20.0f64, 1 => any::<f64>()], 80),
         sorted in any::<bool>(), from in -1.0..6.0f64, dt in -0.5..1.0f64,

@@ -148,7 +148,7 @@ fn a_winding_road_without_houses_gives_the_offset_to_a_millisecond() {
 }
 
 #[test]
-fn straight_at_one_speed_there_is_no_offset() {
+fn a_straight_drive_at_constant_speed_gives_no_offset() {
     let (pictures, rates) = ideal(|_| 0.0, |_| 10.0, 0.02, 0.0);
     let error = time_offset(&pictures, &rates, &OffsetConfig::default()).unwrap_err();
     assert_eq!(error, NoTimeOffset::NothingChanges);
@@ -156,7 +156,7 @@ fn straight_at_one_speed_there_is_no_offset() {
 }
 
 #[test]
-fn pictures_that_do_not_follow_give_none_or_a_large_error() {
+fn unrelated_images_give_no_offset_or_a_large_error() {
     let (mut pictures, rates) = ideal(winding, |_| 10.0, 0.0, 0.0);
     for (i, picture) in pictures.iter_mut().enumerate() {
         picture.shift = (i * i * 31 % 101) as f64 / 50.0 - 1.0;
@@ -183,7 +183,7 @@ fn pictures_that_do_not_follow_give_none_or_a_large_error() {
 }
 
 #[test]
-fn bad_input_is_an_answer_too() {
+fn bad_input_is_refused_or_ignored() {
     let (mut pictures, rates) = ideal(winding, |_| 10.0, 0.0, 0.0);
     let none = time_offset(&pictures[..20], &rates, &OffsetConfig::default());
     assert!(

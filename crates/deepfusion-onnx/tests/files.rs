@@ -382,7 +382,7 @@ fn means_masks_and_concatenations() {
 }
 
 #[test]
-fn deviations() {
+fn deviations_are_relative_to_the_largest_value() {
     assert_eq!(relative(&[1.0, 2.0], &[1.0, 4.0]), 0.5);
     assert_eq!(relative(&[0.0], &[0.0]), 0.0);
     assert_eq!(relative(&[1.0], &[0.0]), f64::INFINITY);

@@ -12,7 +12,7 @@ use deepfusion_onnx::check::{deviation, pictures};
 use deepfusion_onnx::runtime::{OrtEngine, find};
 use deepfusion_onnx::{DepthMaps, DepthModel, Error, reference, write};
 
-/// The library; `None`, with the message printed, if there is none.
+/// Whether a library is found; if not, the error is checked and printed.
 fn library_is_here() -> bool {
     match find(None) {
         Ok(library) => {
@@ -38,7 +38,7 @@ fn library_is_here() -> bool {
 }
 
 #[test]
-fn random_networks_are_what_the_reference_says() {
+fn random_networks_equal_the_reference() {
     if !library_is_here() {
         return;
     }

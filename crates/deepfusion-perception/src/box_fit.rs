@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_does_not_go_on_before_a_face_that_is_seen() {
+    fn a_box_does_not_extend_in_front_of_a_visible_face() {
         let seen = fit(&corner(), Turn::ahead()).unwrap();
         // Its length points away from the lane: both ends of the front are visible, and no car is that short.
         let [right, forward] = seen.place.middle;
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_decide_where_what_is_seen_does_not() {
+    fn neighbours_decide_the_orientation_of_an_unclear_box() {
         // A corner with both ends hidden.
         let unclear = Silhouette {
             hidden: [f32::INFINITY; 2],

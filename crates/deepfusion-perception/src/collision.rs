@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gap_over_the_closing_speed() {
+    fn the_time_is_the_gap_divided_by_the_closing_speed() {
         let vehicle = VehicleShape::default();
         // The rear is 2 m before the centre, the bumper 1.7 m before the camera: 20 - 2 - 1.7 = 16.3 m.
         let standing = [target(1, 0.0, 20.0, [0.0; 3])];
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_likely_counts_until_it_is_sure() {
+    fn the_likeliest_velocity_is_used_until_it_is_certain() {
         let vehicle = VehicleShape::default();
         let mut ahead = target(1, 0.0, 20.0, [0.0; 3]);
         ahead.velocity_mps = None;
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_is_the_vehicles_and_not_the_cameras() {
+    fn the_path_is_the_vehicles_and_not_the_cameras() {
         // The camera looks five degrees to the left, so a target straight ahead of the vehicle appears to the right.
         let yaw = 5.0_f64.to_radians();
         let vehicle = VehicleShape {
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn the_next_lane_is_met_only_in_a_bend() {
+    fn a_target_in_the_next_lane_is_hit_only_in_a_bend() {
         let vehicle = VehicleShape::default();
         let left = [target(4, -3.5, 25.0, [0.0; 3])];
         assert_eq!(time_to_collision(&left, 10.0, 0.0, &vehicle), None);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_is_reported_and_a_standing_car_is_hit_by_what_comes() {
+    fn the_first_collision_is_reported_even_for_a_standing_vehicle() {
         let vehicle = VehicleShape::default();
         let two = [
             target(1, 0.0, 30.0, [0.0; 3]),

@@ -56,7 +56,7 @@ mod tests {
     use crate::clusters::Run;
 
     #[test]
-    fn pixels_come_by_column_from_the_top_down() {
+    fn pixels_are_grouped_by_column_from_the_top_down() {
         let depth: Vec<f32> = (0..12).map(|i| i as f32).collect();
         let run = |v, from, to| Run { v, from, to };
         let cluster = Cluster {

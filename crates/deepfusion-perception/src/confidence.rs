@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn weights_that_made_the_errors_are_found() {
+    fn the_fit_recovers_the_weights_of_the_errors() {
         let truth = ConfidenceModel {
             constant: 0.05,
             gradient: 1.5,
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn evidence_against_itself_gets_no_weight() {
+    fn evidence_that_lowers_the_error_gets_no_weight() {
         let samples: Vec<_> = (0..1000)
             .map(|i| {
                 let e = evidence(i);

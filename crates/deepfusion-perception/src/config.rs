@@ -177,7 +177,7 @@ mod tests {
     use deepfusion_hint::Hint;
 
     #[test]
-    fn settings_that_cannot_be_are_named() {
+    fn invalid_settings_are_named() {
         assert!(PerceptionConfig::default().validate().is_ok());
         assert!(PerceptionConfig::predicted().validate().is_ok());
         let base = PerceptionConfig::default;
@@ -228,8 +228,8 @@ mod tests {
     }
 
     #[test]
-    fn what_a_setting_may_be_is_said() {
-        for (expected, said) in [
+    fn expected_settings_as_text() {
+        for (expected, text) in [
             (Expected::AboveZero, "a number above 0"),
             (Expected::NotNegative, "a number of at least 0"),
             (Expected::Below(80.0), "less than 80"),
@@ -239,7 +239,7 @@ mod tests {
             ),
             (Expected::LowerFirst, "the lower height first"),
         ] {
-            assert_eq!(expected.to_string(), said);
+            assert_eq!(expected.to_string(), text);
         }
         let steep = PerceptionConfig {
             max_tilt_deg: 90.0,

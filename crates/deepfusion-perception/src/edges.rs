@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_ramp_between_two_surfaces_flies() {
+    fn a_ramp_between_two_surfaces_is_flying() {
         // 5 m, a ramp of three pixels, 20 m.
         let row = [5.0, 5.0, 5.0, 8.0, 12.0, 16.0, 20.0, 20.0, 20.0];
         let flying = flying_pixels(&row, 9, 2, 0.08);
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sharp_edge_a_slope_and_holes_do_not() {
+    fn sharp_edges_slopes_and_holes_are_not_flying() {
         let sharp = [5.0, 5.0, 5.0, 20.0, 20.0, 20.0];
         assert!(flying_pixels(&sharp, 6, 1, 0.08).iter().all(|f| !f));
         let slope: Vec<f32> = (0..20).map(|i| 10.0 + 0.4 * i as f32).collect();

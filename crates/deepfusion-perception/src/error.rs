@@ -7,7 +7,7 @@ use deepfusion_hint::Hint;
 pub enum Error {
     /// The depth image does not have the camera's size.
     #[error(
-        "depth has {}x{} pixels, expected the camera intrinsics' {}x{}",
+        "depth has {}x{} pixels, expected the camera's {}x{}",
         found.0, found.1, expected.0, expected.1
     )]
     Size {

@@ -119,7 +119,7 @@ mod tests {
     use deepfusion_hint::Hint;
 
     #[test]
-    fn what_shows_through_a_mask_is_left_out() {
+    fn background_inside_a_mask_is_left_out() {
         let (width, height) = (20, 10);
         // An object 8 m away in the middle, a wall at 30 m around it, the road below.
         let is_thing = |u: usize, v: usize| (5..15).contains(&u) && (2..8).contains(&v);

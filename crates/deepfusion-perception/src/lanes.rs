@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_fills_the_last_lanes_up_changes_nothing() {
+    fn padding_of_the_last_lanes_has_no_effect() {
         for count in [1, 7, 8, 9] {
             let all: Vec<[f32; 2]> = (0..count).map(|i| [i as f32, 10.0 - i as f32]).collect();
             let points = Points::new(all.iter().copied());

@@ -12,7 +12,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strays_at_both_ends_do_not_count() {
+    fn outliers_at_both_ends_are_dropped() {
         let mut values: Vec<f32> = (0..40).rev().map(|x| x as f32).collect();
         assert_eq!(ends(&mut values, 20), Some([2.0, 37.0]));
         assert_eq!(ends(&mut values, 100), Some([0.0, 39.0]));

@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_tells_how_those_in_it_are_turned() {
+    fn a_row_gives_the_orientation_of_its_cars() {
         let clear = vote([6.0, 10.0], 0.0, 3.0);
         let beside = vote([5.0, 15.2], FRAC_PI_2, 0.0);
         let in_the_lane = vote([0.5, 12.0], FRAC_PI_2, 0.0);
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn one_that_stands_as_all_do_says_less_than_one_that_does_not() {
+    fn votes_along_the_road_weigh_less_than_votes_across() {
         let votes = [
             vote([6.0, 10.0], 0.0, 3.0),
             vote([6.0, 13.0], 0.0, 0.0),
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_against_an_angle_is_least_at_its_own() {
+    fn the_cost_is_smallest_at_the_orientations_own_angle() {
         let turn = Turn::new(0.3, 2.0);
         assert!(turn.against(0.3).abs() < 1e-6);
         assert!((turn.against(0.3 + FRAC_PI_2) - 4.0 * COST).abs() < 1e-5);

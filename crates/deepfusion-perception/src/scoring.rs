@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn where_nothing_is_labelled_nothing_is_false() {
+    fn unlabelled_targets_are_not_false() {
         let mut scorer = Scorer::new(ScoringRules::default());
         let (near, far) = (target(1, [0.0, 1.0, 10.0]), target(2, [0.0, 1.0, 30.0]));
         let labels = [label(5, [0.0, 1.0, 10.0], true)];
@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn velocities_count_after_a_second_and_switches_begin_anew() {
+    fn velocities_count_after_a_second_and_again_after_a_switch() {
         let mut scorer = Scorer::new(ScoringRules::default());
         let labels = [label(1, [0.0, 1.0, 10.0], true)];
         for (time_s, id) in [(0.0, 3), (0.5, 3), (1.0, 3), (1.5, 4), (2.0, 4)] {
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_seen_is_not_a_number_but_none() {
+    fn scores_without_data_are_none_and_not_nan() {
         let score = Scorer::new(ScoringRules::default()).score();
         assert_eq!((score.recall, score.center_error_m), (None, None));
     }

@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn two_fronts_are_parted_where_one_ends() {
+    fn two_fronts_are_split_where_one_ends() {
         let mut row = silhouette(fronts(), vec![false; 20]);
         assert_eq!(seam(&row), Some(9));
         // If the lower part is hidden, the step may be a windscreen behind a hood.
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pillar_is_parted_from_the_car_beside_it() {
+    fn a_pillar_is_split_from_the_car_beside_it() {
         let flat: Vec<[f32; 2]> = (0..12).map(|i| [0.05 * i as f32, 9.0]).collect();
         let rises: Vec<bool> = (0..12).map(|i| i < 4).collect();
         assert_eq!(seam(&silhouette(flat.clone(), rises)), Some(3));

@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bounds_are_those_of_the_image() {
+    fn bounds_are_scaled_to_the_image() {
         let scaled = |bounds, working, image| {
             let mut targets = [Target {
                 id: 1,

@@ -75,7 +75,7 @@ fn nothing_sky_one_point_and_nan_give_no_targets() {
 }
 
 #[test]
-fn a_million_pixels_and_a_single_one_are_looked_at() {
+fn a_million_pixels_and_a_single_one_are_processed() {
     let large = camera(1600, 640);
     both(&road(&large, 1.5), &large);
     let tiny = camera(1, 1);
@@ -116,7 +116,7 @@ fn wrong_sizes_and_cameras_are_errors_with_hints() {
 }
 
 #[test]
-fn a_clock_that_jumps_begins_anew_and_ids_are_not_used_twice() {
+fn a_clock_jump_restarts_tracking_without_reusing_ids() {
     let k = camera(640, 192);
     let mut depth = road(&k, 0.0);
     for v in 99..126 {
@@ -149,7 +149,7 @@ proptest! {
 
     /// Whatever the pixels contain, nothing panics and every target has a valid box.
     #[test]
-    fn rubbish_gives_boxes_or_nothing(
+    fn any_depth_gives_valid_boxes_or_none(
         width in 2u32..70, height in 2u32..40,
         seed in proptest::collection::vec(prop_oneof![
             Just(0.0f32), Just(f32::NAN), Just(-3.0), Just(1e30), 0.1f32..90.0, 5.0f32..8.0

@@ -49,7 +49,7 @@ fn rows_of_cars_in_a_garage_are_separated() {
 
 /// In a drive's first second few cars have been seen twice; the longer it lasts, the more rows are known.
 #[test]
-fn a_longer_drive_knows_its_rows() {
+fn a_longer_drive_has_higher_recall() {
     let score = common::score(&[71, 75].map(|seed| SimConfig {
         frames: 60,
         ..drive(Scene::Garage, seed)
@@ -63,7 +63,7 @@ fn a_longer_drive_knows_its_rows() {
 
 /// Rows are completed only if asked for; otherwise the boxes are those of each image alone.
 #[test]
-fn rows_are_completed_where_they_are_asked_for() {
+fn rows_are_completed_only_on_request() {
     let simulation = Simulation::new(&drive(Scene::Garage, 201)).unwrap();
     let k = simulation.intrinsics();
     let rays = Rays::of(&k);

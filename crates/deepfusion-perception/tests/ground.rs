@@ -76,7 +76,7 @@ fn a_road_that_begins_to_climb_or_to_fall() {
 }
 
 #[test]
-fn axes_are_orthonormal_and_places_are_found_again() {
+fn axes_are_orthonormal_and_points_round_trip() {
     let ground = Ground::plane([0.05, -1.0, 0.08], 1.4);
     let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     for (a, b, expected) in [

@@ -35,7 +35,7 @@ fn near(targets: &[Target], x: f64) -> Option<&Target> {
 }
 
 #[test]
-fn what_touches_is_separated_by_its_masks() {
+fn touching_objects_are_separated_by_their_masks() {
     let (depth, seen) = scene(&CARS);
     let mut perception = Perception::new(PerceptionConfig::default());
     let masks = [mask(&seen, 0, "car"), mask(&seen, 1, "van")];

@@ -31,7 +31,7 @@ static ALLOCATOR: Counting = Counting;
 
 /// Ten thousand frames of a street that is driven again and again, with tracks that start and end.
 #[test]
-fn ten_thousand_frames_hold_no_more_than_a_thousand() {
+fn ten_thousand_frames_need_no_more_memory_than_a_thousand() {
     let simulation = Simulation::new(&SimConfig {
         seed: 5,
         frames: 24,

@@ -30,7 +30,7 @@ fn car(front_m: f64) -> DepthMap {
 
 /// A target's standard deviation is that of its pixels, in a single image and when tracked. Without the pixels' values it has none.
 #[test]
-fn a_target_says_what_its_distance_is_worth() {
+fn a_target_has_the_standard_deviation_of_its_distance() {
     let (depth, k) = (car(14.0), camera());
     let mut deviation = sigma(&depth, 0.07);
     // Pixels outside the car, and those without a value, have no effect.
@@ -56,7 +56,7 @@ fn a_target_says_what_its_distance_is_worth() {
 /// A car that has stood for a second and jumps by three metres is another car with exact depth, but the same car with depth that is
 /// accurate to a tenth.
 #[test]
-fn what_is_unsure_may_be_found_farther_off() {
+fn uncertain_targets_may_be_matched_farther_away() {
     let k = camera();
     let (before, after) = (car(18.0), car(21.2));
     let ids = |share: f32| {

@@ -77,8 +77,8 @@ impl Ros2Bag {
     ///
     /// MCAP files are mapped: they must not be shortened while the bag is open.
     ///
+    /// # Errors
     /// [`Error::File`]; [`Error::Storage`] for files of another kind, files that are compressed as
-    /// [`Error::File`]; [`Error::Storage`] for files of another kind, ones that are compressed as
     /// a whole, and a `metadata.yaml` that cannot be read; [`Error::Feature`] for SQLite without the feature `ros2-sqlite`.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
@@ -244,8 +244,8 @@ pub struct BagDamage {
 
 impl fmt::Display for BagDamage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let said: Vec<String> = self.files.iter().map(FileDamage::to_string).collect();
-        f.write_str(&said.join("; "))
+        let messages: Vec<String> = self.files.iter().map(FileDamage::to_string).collect();
+        f.write_str(&messages.join("; "))
     }
 }
 

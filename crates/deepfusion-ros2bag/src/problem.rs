@@ -49,7 +49,7 @@ pub enum StorageProblem {
     },
     /// SQLite cannot read the database.
     #[cfg(feature = "ros2-sqlite")]
-    #[error("{}", sqlite::said(.0))]
+    #[error("{}", sqlite::message(.0))]
     Sqlite(#[source] rusqlite::Error),
     /// A message of a database cannot be decompressed.
     #[cfg(feature = "ros2-sqlite")]

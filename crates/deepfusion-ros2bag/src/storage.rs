@@ -20,7 +20,7 @@ pub(crate) trait Storage: fmt::Debug + Send + Sync {
     /// The times of the first and the last message.
     fn range(&self) -> Option<(Time, Time)>;
 
-    /// What cannot be read of it.
+    /// The damage, if a part of the file cannot be read.
     fn damage(&self) -> Option<SourceDamage>;
 
     /// The messages of the channels that are `wanted`, by index, in time order.

@@ -31,7 +31,7 @@ fn open(folder: &Path, name: &str, bytes: &[u8]) -> deepfusion_rosbag::Result<Ro
 }
 
 #[test]
-fn a_file_that_was_cut_off_is_read_up_to_the_break() {
+fn a_truncated_file_is_read_up_to_the_damage() {
     let folder = tempfile::tempdir().unwrap();
     for name in [
         "none.mcap",
@@ -69,7 +69,7 @@ fn a_file_that_was_cut_off_is_read_up_to_the_break() {
 }
 
 #[test]
-fn a_chunk_that_is_hurt_costs_its_own_messages() {
+fn a_damaged_chunk_costs_only_its_own_messages() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["none.mcap", "lz4.mcap", "zstd.mcap"] {
         let mut bytes = std::fs::read(reference(name)).unwrap();
@@ -93,7 +93,7 @@ fn a_chunk_that_is_hurt_costs_its_own_messages() {
 }
 
 #[test]
-fn a_hurt_summary_is_replaced_by_a_scan() {
+fn a_damaged_summary_is_replaced_by_a_scan() {
     let folder = tempfile::tempdir().unwrap();
     let mut bytes = std::fs::read(reference("zstd.mcap")).unwrap();
     let footer = bytes.len() - 8 - 20;
@@ -107,7 +107,7 @@ fn a_hurt_summary_is_replaced_by_a_scan() {
 }
 
 #[test]
-fn a_database_that_was_cut_off_is_read_up_to_the_break() {
+fn a_truncated_database_is_read_up_to_the_damage() {
     let folder = tempfile::tempdir().unwrap();
     let whole = std::fs::read(reference("sqlite/sqlite.db3")).unwrap();
     let all: HashSet<Read> = read(&Ros2Bag::open(reference("sqlite")).unwrap())
@@ -140,7 +140,7 @@ fn a_database_that_was_cut_off_is_read_up_to_the_break() {
 }
 
 #[test]
-fn any_byte_may_be_wrong() {
+fn no_changed_byte_panics() {
     let folder = tempfile::tempdir().unwrap();
     for (name, step) in [
         ("zstd.mcap", 61),
@@ -161,7 +161,7 @@ fn any_byte_may_be_wrong() {
 }
 
 #[test]
-fn what_is_not_read_says_what_to_do() {
+fn unsupported_files_have_a_hint() {
     let folder = tempfile::tempdir().unwrap();
     let failed = |name: &str, bytes: &[u8]| {
         let error = open(folder.path(), name, bytes).unwrap_err();
@@ -198,10 +198,10 @@ fn what_is_not_read_says_what_to_do() {
         panic!("{damage}");
     };
     assert_eq!(files, &[FileDamage::NotThere(bag.join("bag_1.db3"))]);
-    let said = damage.to_string();
+    let message = damage.to_string();
     assert!(
-        said.ends_with("bag_1.db3: no such file or folder"),
-        "{said}"
+        message.ends_with("bag_1.db3: no such file or folder"),
+        "{message}"
     );
     std::fs::write(
         bag.join("metadata.yaml"),

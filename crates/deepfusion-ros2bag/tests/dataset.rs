@@ -17,7 +17,7 @@ fn ros2(name: &str) -> Dataset {
 }
 
 #[test]
-fn the_data_set_is_that_of_the_ros1_bag() {
+fn the_data_set_equals_that_of_the_ros1_bag() {
     let mut all = Dataset::open(&drive("drive.bag"), &OpenOptions::default()).unwrap();
     let expected = all.remove(0);
     assert_eq!(expected.frames().len(), 10);

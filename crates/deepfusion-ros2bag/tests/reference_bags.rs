@@ -90,7 +90,7 @@ fn a_header_s_stamp_is_read_without_the_rest() {
 }
 
 #[test]
-fn selections_hold_the_messages_of_their_topics_and_times() {
+fn selections_have_the_messages_of_their_topics_and_times() {
     let all = read_json::<EveryType>("every_type.json").messages;
     let (first, last) = (all[0].time, all[47].time);
     let middle = (first + last) / 2;
@@ -150,7 +150,7 @@ fn topics_have_type_count_range_and_rate() {
 }
 
 #[test]
-fn bags_are_known_by_name_and_metadata() {
+fn bags_are_recognised_by_name_and_metadata() {
     for name in SAME {
         assert!(is_ros2_bag(&reference(name)), "{name}");
     }
@@ -168,7 +168,7 @@ struct RealTopic {
 }
 
 #[test]
-fn real_bags_hold_what_rosbags_reads() {
+fn real_bags_equal_what_rosbags_reads() {
     let Some(folder) = real_bags() else { return };
     let folder = folder.join("rosbags_rs_ros2_all_msgs");
     if !folder.is_dir() {

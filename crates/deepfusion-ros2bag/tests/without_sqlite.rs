@@ -13,7 +13,7 @@ fn reference(name: &str) -> PathBuf {
 }
 
 #[test]
-fn a_database_names_the_feature_that_reads_it() {
+fn the_error_for_a_database_names_the_feature() {
     for name in ["sqlite", "sqlite/sqlite.db3"] {
         assert!(is_ros2_bag(&reference(name)), "{name}");
         let error = Ros2Bag::open(reference(name)).unwrap_err();
@@ -27,7 +27,7 @@ fn a_database_names_the_feature_that_reads_it() {
 }
 
 #[test]
-fn every_kind_of_mcap_is_read_all_the_same() {
+fn every_kind_of_mcap_is_read_without_sqlite() {
     for name in ["mcap", "none.mcap", "lz4.mcap", "zstd.mcap", "bare.mcap"] {
         let bag = Ros2Bag::open(reference(name)).unwrap();
         let messages = bag.messages(Selection::all()).unwrap();

@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn buffers_come_back_empty_and_no_more_than_asked_for() {
+    fn the_pool_keeps_a_limited_number_of_empty_buffers() {
         let pool = Pool::new(1);
         let (mut one, two) = (pool.take(), pool.take());
         one.extend(&[1; 1000]);

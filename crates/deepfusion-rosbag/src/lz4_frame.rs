@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_come_back_alone_and_linked_and_frame_after_frame() {
+    fn independent_blocks_linked_blocks_and_several_frames_are_read() {
         let content = content();
         for mode in [BlockMode::Independent, BlockMode::Linked] {
             let stored = frame(mode, &content);
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_is_cut_or_too_long_gives_its_beginning() {
+    fn a_truncated_or_too_long_frame_gives_its_beginning() {
         let content = content();
         let stored = frame(BlockMode::Linked, &content);
         for cut in 1..stored.len() {

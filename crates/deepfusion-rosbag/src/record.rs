@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_that_lie_are_faults() {
+    fn wrong_lengths_are_faults() {
         let sound = record(&field("op", &[5]), b"data");
         for (at, what) in [(0, "header"), (4, "op"), (12, "data")] {
             let mut bytes = sound.clone();

@@ -48,7 +48,7 @@ mod tests {
     use crate::{Damage, ScanReason};
 
     #[test]
-    fn it_is_what_its_reader_found() {
+    fn damage_keeps_its_type_message_and_equality() {
         let at = |offset| Damage {
             offset,
             reason: ScanReason::NoIndex,

@@ -76,13 +76,13 @@ fn messages_of_all_bags_come_in_time_order() {
 fn connections_are_merged_by_topic_and_md5() {
     let folder = tempfile::tempdir().unwrap();
     let set = BagSet::open(parts(folder.path())).unwrap();
-    let said: Vec<_> = set
+    let found: Vec<_> = set
         .connections()
         .iter()
         .map(|c| (c.id, c.topic.as_str(), c.count))
         .collect();
     assert_eq!(
-        said,
+        found,
         [
             (0, "/only/2", 20),
             (1, "/shared", 60),

@@ -116,7 +116,7 @@ fn whole_before(bytes: &[u8], cut: usize, compression: Compression) -> (usize, u
 }
 
 #[test]
-fn a_bag_cut_at_any_byte_gives_what_lies_before() {
+fn a_bag_truncated_at_any_byte_gives_the_messages_before() {
     for compression in COMPRESSIONS {
         let bytes = small(compression);
         let (all, errors) = read(&open(bytes.clone()).unwrap());
@@ -160,7 +160,7 @@ fn a_bag_cut_at_any_byte_gives_what_lies_before() {
 }
 
 #[test]
-fn a_bag_that_was_never_finished_is_read_and_says_so() {
+fn an_unfinished_bag_is_read_and_its_damage_reported() {
     for compression in COMPRESSIONS {
         let mut bytes = small(compression);
         let whole = read(&open(bytes.clone()).unwrap()).0;
@@ -252,7 +252,7 @@ fn a_damaged_chunk_is_an_error_and_the_others_are_read() {
 }
 
 #[test]
-fn lengths_that_lie_take_no_memory() {
+fn wrong_lengths_take_no_memory() {
     // A chunk of a few bytes that claims 2 GiB; a bag header that counts 2³² connections and chunks.
     for compression in [Compression::Lz4, Compression::Bz2] {
         let mut bytes = small(compression);
@@ -333,7 +333,7 @@ fn other_files_are_refused_by_name() {
 }
 
 #[test]
-fn a_message_that_is_cut_names_its_field() {
+fn the_error_of_a_truncated_message_names_its_field() {
     let mut bytes = Vec::new();
     let points = [1.0_f32, 2.0];
     PointCloud2::from_columns(header(3), &[("x", &points)])

@@ -58,7 +58,7 @@ where
 }
 
 #[test]
-fn frames_are_what_rosbags_writes() {
+fn frames_equal_those_of_rosbags() {
     let types = read_json("frames.json");
     check::<TFMessage>(&types);
     check::<OldTFMessage>(&types);

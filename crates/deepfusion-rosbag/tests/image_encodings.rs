@@ -31,7 +31,7 @@ fn bytes(hex: &str) -> Vec<u8> {
 /// result from one pixel further in, while here the missing colours are interpolated from the existing ones. On random pixels the two
 /// differ freely.
 #[test]
-fn every_encoding_is_what_opencv_makes_of_it() {
+fn every_encoding_equals_opencvs_result() {
     let mut seen = BTreeMap::new();
     for case in read_json::<Vec<Case>>("opencv_images.json") {
         let (width, height) = (case.width as usize, case.height as usize);

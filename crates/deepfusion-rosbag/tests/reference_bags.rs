@@ -67,7 +67,7 @@ fn each_compression(check: impl Fn(&Bag, &EveryType)) {
 }
 
 fn connections(bag: &Bag) -> Vec<Connection> {
-    let said = |c: &deepfusion_rosbag::Connection| Connection {
+    let described = |c: &deepfusion_rosbag::Connection| Connection {
         topic: c.topic.clone(),
         r#type: c.type_name.clone(),
         md5: c.md5.clone(),
@@ -75,7 +75,7 @@ fn connections(bag: &Bag) -> Vec<Connection> {
         caller_id: c.caller_id.clone(),
         latching: c.latching,
     };
-    bag.connections().iter().map(said).collect()
+    bag.connections().iter().map(described).collect()
 }
 
 fn nanos(bag: &Bag) -> (u64, u64) {
@@ -84,7 +84,7 @@ fn nanos(bag: &Bag) -> (u64, u64) {
 }
 
 #[test]
-fn the_index_is_what_rosbags_reads() {
+fn the_index_equals_that_of_rosbags() {
     each_compression(|bag, expected| {
         assert_eq!(connections(bag), expected.connections);
         assert_eq!(nanos(bag), (expected.first, expected.last));
@@ -110,7 +110,7 @@ fn every_message_has_the_same_bytes_and_values() {
 }
 
 #[test]
-fn columns_of_clouds_are_what_numpy_reads() {
+fn columns_of_clouds_equal_numpys() {
     let clouds = check_each(|expected, message| {
         let columns = expected.columns.as_ref()?;
         let cloud: PointCloud2 = message.decode().unwrap();
@@ -128,7 +128,7 @@ fn columns_of_clouds_are_what_numpy_reads() {
 }
 
 #[test]
-fn pixels_are_what_numpy_reads() {
+fn pixels_equal_numpys() {
     let pictures = check_each(|expected, message| {
         let (wide, rgb) = (expected.u16.as_ref(), expected.rgb8.as_ref());
         wide.is_some().then_some(()).or(rgb.map(|_| ()))?;
@@ -277,7 +277,7 @@ struct Values {
 }
 
 #[test]
-fn real_bags_hold_what_rosbags_reads() {
+fn real_bags_equal_what_rosbags_reads() {
     let Some(folder) = real_bags() else { return };
     let bags: BTreeMap<String, RealBag> = read_json("real_bags.json");
     assert_eq!(bags.len(), 3);

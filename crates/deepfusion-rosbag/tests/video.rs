@@ -104,7 +104,7 @@ fn check<'a, T: RosMessage<'a> + Lines>(expected: &Type, written: &'a [[Vec<u8>;
 }
 
 #[test]
-fn packets_are_what_rosbags_writes() {
+fn packets_equal_those_of_rosbags() {
     let types: BTreeMap<String, Type> = read_json("video.json");
     let written = |name: &str| {
         let t = &types[name];

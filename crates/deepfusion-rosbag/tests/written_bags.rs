@@ -39,7 +39,7 @@ fn the_bytes_are_those_that_rosbags_accepted() {
 }
 
 #[test]
-fn what_was_written_is_read_back() {
+fn written_bags_are_read_back() {
     let folder = tempfile::tempdir().unwrap();
     for compression in COMPRESSIONS {
         let path = folder.path().join("a.bag");

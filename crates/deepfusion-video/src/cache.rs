@@ -102,7 +102,7 @@ impl Origin {
     }
 }
 
-/// Where the frames of a video, or of a stream in a recording, are kept in `folder`: as `<name>.frames` if it is the folder of `file`,
+/// Where the frames of a video, or of a stream in a recording, are kept in `folder`: as `<name>.frames` if `file` is in it,
 /// else as `<name>-<hash>.frames`, with a hash of the file's path, as recordings with the same name may share a folder.
 #[must_use]
 pub fn frames_folder(folder: &Path, file: &Path, name: &str) -> PathBuf {
@@ -154,6 +154,7 @@ pub(crate) fn frame_path(cache: &Path, index: u64) -> PathBuf {
 
 /// Calls `make` to decode the frames into a temporary folder, which is renamed when it is complete. Does nothing if the cache
 /// has them already.
+///
 /// # Errors
 /// Those of `make`; [`Error::File`].
 pub(crate) fn keep<E: From<Error>>(
@@ -233,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_made_once_and_anew_for_another_video() {
+    fn frames_are_decoded_once_and_again_for_another_video() {
         let folder = tempfile::tempdir().unwrap();
         let (cache, origin) = video(folder.path(), 3);
         let never = |_: &Path| -> Result<()> { panic!("the frames exist already") };
@@ -248,7 +249,7 @@ mod tests {
 
     /// Two drives whose cameras' files have the same name, with one folder for the frames of both.
     #[test]
-    fn videos_of_one_name_share_no_frames() {
+    fn videos_with_the_same_name_share_no_frames() {
         let root = tempfile::tempdir().unwrap();
         let scratch = root.path().join("scratch");
         let kept = ["monday", "tuesday"].map(|day| {
@@ -285,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_a_videos_until_it_changes() {
+    fn frames_are_valid_until_their_video_changes() {
         let root = tempfile::tempdir().unwrap();
         let file = root.path().join("front.mp4");
         std::fs::write(&file, "x").unwrap();
@@ -312,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_of_before_stay_valid_beside_their_video() {
+    fn frames_of_older_versions_stay_valid_beside_their_video() {
         let folder = tempfile::tempdir().unwrap();
         let (_, origin) = video(folder.path(), 3);
         let text = serde_json::to_string(&origin).unwrap();
@@ -324,7 +325,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_leads_to_where_there_is_room() {
+    fn a_linked_cache_is_filled_through_the_link() {
         let folder = tempfile::tempdir().unwrap();
         let (cache, origin) = video(folder.path(), 3);
         let disk = folder.path().join("disk/frames");
@@ -340,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fails_leaves_nothing_and_other_files_are_not_replaced() {
+    fn a_failure_leaves_nothing_and_other_files_are_not_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let (cache, origin) = video(folder.path(), 3);
         let fails = |part: &Path| -> Result<()> {

@@ -17,7 +17,7 @@ pub(crate) struct Decoded(Mutex<Option<Result<(), Refusal>>>);
 /// Why frames could not be decoded: the message of the first error.
 #[derive(Debug, Clone)]
 struct Refusal {
-    said: String,
+    message: String,
     hint: Option<String>,
     when: Instant,
     /// Number of attempts.
@@ -38,7 +38,7 @@ impl Decoded {
         let mut outcome = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let tries = match &*outcome {
             Some(Ok(())) => return Ok(()),
-            Some(Err(refusal)) if !refusal.is_to_be_tried(PAUSE) => {
+            Some(Err(refusal)) if !refusal.may_be_retried(PAUSE) => {
                 return Err(refusal.again().into());
             }
             Some(Err(refusal)) => refusal.tries,
@@ -55,31 +55,31 @@ impl Decoded {
 
 impl Refusal {
     fn of(error: &impl Hint, tries: u32) -> Self {
-        let mut said = error.to_string();
+        let mut message = error.to_string();
         let mut cause = error.source();
         while let Some(error) = cause {
             let text = error.to_string();
             // Many messages already contain their cause's message.
-            if !said.contains(&text) {
-                said += &format!(": {text}");
+            if !message.contains(&text) {
+                message += &format!(": {text}");
             }
             cause = error.source();
         }
         Self {
-            said,
+            message,
             hint: error.hint(),
             when: Instant::now(),
             tries,
         }
     }
 
-    fn is_to_be_tried(&self, pause: Duration) -> bool {
+    fn may_be_retried(&self, pause: Duration) -> bool {
         self.tries < TRIES && self.when.elapsed() >= pause
     }
 
     fn again(&self) -> Error {
-        let Self { said, hint, .. } = self.clone();
-        Error::NotDecoded { said, hint }
+        let Self { message, hint, .. } = self.clone();
+        Error::NotDecoded { message, hint }
     }
 }
 
@@ -90,7 +90,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn what_failed_once_is_not_tried_again() {
+    fn a_failure_is_not_retried_at_once() {
         let decoded = Decoded::default();
         let full = || Error::file(Path::new("cache"), ErrorKind::StorageFull.into());
         let first = decoded.once(|| Err(full())).unwrap_err();
@@ -105,16 +105,16 @@ mod tests {
     }
 
     #[test]
-    fn what_failed_is_tried_again_later_a_few_times() {
+    fn a_failure_is_retried_a_few_times_later() {
         let full = Error::file(Path::new("cache"), ErrorKind::StorageFull.into());
         let refusal = Refusal::of(&full, 1);
-        assert!(!refusal.is_to_be_tried(PAUSE));
-        assert!(refusal.is_to_be_tried(Duration::ZERO));
-        assert!(!Refusal::of(&full, TRIES).is_to_be_tried(Duration::ZERO));
+        assert!(!refusal.may_be_retried(PAUSE));
+        assert!(refusal.may_be_retried(Duration::ZERO));
+        assert!(!Refusal::of(&full, TRIES).may_be_retried(Duration::ZERO));
     }
 
     #[test]
-    fn what_is_decoded_is_decoded_once() {
+    fn decoding_happens_once() {
         let decoded = Decoded::default();
         let mut times = 0;
         for _ in 0..3 {

@@ -9,7 +9,7 @@ use std::time::Duration;
 #[non_exhaustive]
 pub enum Error {
     /// A file could not be opened, read or written.
-    #[error("{}: {}", path.display(), said(source))]
+    #[error("{}: {}", path.display(), message_of(source))]
     File {
         /// Path of the file.
         path: PathBuf,
@@ -57,10 +57,10 @@ pub enum Error {
         format: String,
     },
     /// Frames could not be decoded when the first was requested. They are not decoded again for each frame.
-    #[error("{said}")]
+    #[error("{message}")]
     NotDecoded {
         /// The message of that error.
-        said: String,
+        message: String,
         /// The hint of that error.
         hint: Option<String>,
     },
@@ -80,7 +80,7 @@ pub enum Error {
         problem: CameraModeProblem,
     },
     /// A live source sends no frame within the timeout.
-    #[error("{address}: ffmpeg gave no frame for {} s{}{}", waited.as_secs_f64(), after(*frames), quoted(said))]
+    #[error("{address}: ffmpeg gave no frame for {} s{}{}", waited.as_secs_f64(), after(*frames), quoted(lines))]
     Silent {
         /// Address of the source, without its password.
         address: String,
@@ -89,7 +89,7 @@ pub enum Error {
         /// Number of frames received before.
         frames: u64,
         /// The last lines that ffmpeg printed.
-        said: Vec<String>,
+        lines: Vec<String>,
     },
 }
 
@@ -129,7 +129,7 @@ impl Hint for Error {
 }
 
 /// The system's message, or a plainer one for the most usual errors.
-fn said(error: &std::io::Error) -> String {
+fn message_of(error: &std::io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => "no such file or folder".into(),
         _ => error.to_string(),

@@ -8,7 +8,7 @@
 use crate::cache::{Origin, frame_path, frames_folder, keep};
 use crate::decoded::Decoded;
 use crate::probe::{Probed, probe};
-use crate::program::{Printed, in_either_words, outcome};
+use crate::program::{Printed, outcome, with_either_option_name};
 use crate::{Error, ProgramProblem, ProgramTask, Result};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -100,7 +100,7 @@ fn decode(video: &Path, part: &Path, probed: &Probed) -> Result<()> {
     let (width, height) = probed.size;
     let scale = (!probed.square).then(|| format!("scale={width}:{height},setsar=1"));
     // One file per frame: none is duplicated or dropped to keep a rate.
-    in_either_words(|mode| ffmpeg(video, part, mode, scale.as_deref()))?
+    with_either_option_name(|mode| ffmpeg(video, part, mode, scale.as_deref()))?
         .succeeded("ffmpeg", (video, ProgramTask::Read))?;
     let written = std::fs::read_dir(part)
         .map_err(|e| Error::file(part, e))?

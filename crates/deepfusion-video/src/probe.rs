@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_that_are_not_square_are_made_so() {
+    fn non_square_pixels_are_made_square() {
         for (aspect, size, square) in [
             ("4:3", (1920, 1080), false),
             ("1:1", (1440, 1080), true),
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_video_is_an_error() {
+    fn files_that_are_not_videos_are_errors() {
         for (json, problem) in [
             ("{}", "no video stream"),
             (r#"{"streams": [{}]}"#, "images' size"),

@@ -43,18 +43,18 @@ pub enum ProgramProblem {
     #[error("cannot be run: {0}")]
     NotRun(#[source] std::io::Error),
     /// The program failed.
-    #[error("failed: {said}")]
+    #[error("failed: {message}")]
     Failed {
         /// The task of the program.
         task: ProgramTask,
         /// What it printed.
-        said: String,
+        message: String,
     },
     /// The program lacks a decoder, or space for its pictures.
-    #[error("{said}")]
+    #[error("{message}")]
     Unable {
         /// The line in which it says so.
-        said: String,
+        message: String,
     },
     /// The program decoded another number of frames than ffprobe counts.
     #[error("decoded {}, ffprobe counts {counted}", count_of(*decoded, "frame"))]
@@ -65,10 +65,10 @@ pub enum ProgramProblem {
         counted: usize,
     },
     /// The program stopped early, and reported success.
-    #[error("wrote only a part of the video: {said}")]
+    #[error("wrote only a part of the video: {message}")]
     StoppedEarly {
         /// What it printed.
-        said: String,
+        message: String,
     },
     /// The program's answer cannot be used.
     #[error(transparent)]

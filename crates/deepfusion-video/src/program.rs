@@ -51,7 +51,7 @@ impl Printed {
             program,
             problem: ProgramProblem::Failed {
                 task,
-                said: self.complaint,
+                message: self.complaint,
             },
         })
     }
@@ -98,9 +98,9 @@ pub(crate) fn outcome<S: AsRef<OsStr>>(
         child.wait_with_output()
     })
     .map_err(failed)?;
-    let said = String::from_utf8_lossy(&output.stderr);
+    let message = String::from_utf8_lossy(&output.stderr);
     Ok(Printed {
-        complaint: said.trim().chars().take(LONGEST).collect(),
+        complaint: message.trim().chars().take(LONGEST).collect(),
         text: output.stdout,
         succeeded: output.status.success(),
     })
@@ -110,7 +110,7 @@ pub(crate) fn outcome<S: AsRef<OsStr>>(
 ///
 /// # Errors
 /// Those of `run`.
-pub(crate) fn in_either_words(run: impl Fn(&str) -> Result<Printed>) -> Result<Printed> {
+pub(crate) fn with_either_option_name(run: impl Fn(&str) -> Result<Printed>) -> Result<Printed> {
     let printed = run("-fps_mode")?;
     if printed.does_not_know("fps_mode") {
         run("-vsync")

@@ -1,6 +1,6 @@
 //! Writes pictures as a video file.
 
-use crate::program::{in_either_words, outcome, run};
+use crate::program::{outcome, run, with_either_option_name};
 use crate::{Error, ProgramProblem, ProgramTask, Result};
 use deepfusion_fs::PartialFolder;
 use image::ImageReader;
@@ -124,7 +124,7 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
             None,
         )
     };
-    let done = in_either_words(with)?.succeeded("ffmpeg", (video, ProgramTask::Write))?;
+    let done = with_either_option_name(with)?.succeeded("ffmpeg", (video, ProgramTask::Write))?;
     // ffmpeg continues after a picture that it cannot read, or ends there, and reports success in both cases.
     if done.complaint.is_empty() {
         Ok(())
@@ -133,7 +133,7 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
             path: video.to_owned(),
             program: "ffmpeg",
             problem: ProgramProblem::StoppedEarly {
-                said: done.complaint,
+                message: done.complaint,
             },
         })
     }
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_of_a_list_is_named_twice() {
+    fn the_last_picture_is_listed_twice() {
         let shown = |file: &str| VideoPicture {
             file: file.into(),
             seconds: 0.04,

@@ -58,7 +58,7 @@ fn frames(folder: &Path, cache: &str, count: usize) -> PacketFrames {
 }
 
 #[test]
-fn parts_are_decoded_as_the_whole() {
+fn batches_equal_the_whole_stream() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let Some(packets) = stream(at) else { return };
@@ -107,7 +107,7 @@ fn a_stream_of_any_rate_may_end_with_a_few_packets() {
 
 /// A folder that is not a complete cache is refused before anything is decoded.
 #[test]
-fn what_is_in_the_way_is_said_first() {
+fn other_files_are_refused_before_decoding() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("kept")).unwrap();
     fs::write(folder.path().join("kept/notes.txt"), "mine").unwrap();
@@ -120,7 +120,7 @@ fn what_is_in_the_way_is_said_first() {
 }
 
 #[test]
-fn the_message_that_is_wrong_is_named_in_any_part() {
+fn the_damaged_message_is_named_in_any_batch() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let Some(packets) = stream(at) else { return };

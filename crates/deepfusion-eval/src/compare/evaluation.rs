@@ -59,7 +59,7 @@ impl Evaluation {
                 all.push(Self::read(path, None, &mut digests)?);
             }
         }
-        tell_apart(&mut all);
+        distinguish(&mut all);
         Ok(all)
     }
 
@@ -165,7 +165,7 @@ pub(crate) fn in_words(how: PostProcess) -> String {
 }
 
 /// Adds to rows of the same name and table what distinguishes them: the checkpoint, then the engine, then the path.
-fn tell_apart(all: &mut [Evaluation]) {
+fn distinguish(all: &mut [Evaluation]) {
     type Distinction = fn(&Evaluation) -> Option<String>;
     let distinctions: [Distinction; 4] = [
         |e| e.post_process().map(in_words),

@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_written_as_scripts_expect_it() {
+    fn the_json_has_the_documented_fields() {
         let open = serde_json::to_value(MetricScale::default()).unwrap();
         let expected = serde_json::json!({"bias": null, "ci95": null, "verdict": "open"});
         assert_eq!(open, expected);

@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_the_field_pass() {
+    fn published_rows_pass() {
         for row in [
             [0.115, 0.903, 4.863, 0.193, 0.877, 0.959, 0.981],
             [0.107, 0.765, 4.561, 0.183, 0.886, 0.963, 0.983],

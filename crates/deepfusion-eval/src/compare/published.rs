@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rows_that_cannot_be_right_are_the_papers() {
+    fn only_rows_of_the_deepfusion_paper_are_flagged() {
         assert_eq!(
             flagged(Severity::Impossible),
             ["Published: KITTI Eigen, ground truth as recorded, 1024×320 and larger | DeepFusion"]
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn every_row_says_where_it_is_from() {
+    fn every_row_has_a_source() {
         let tables = published_tables().unwrap();
         for table in &tables.tables {
             assert!(!table.rows.is_empty(), "{}", table.title);
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_that_are_broken_are_errors() {
+    fn invalid_tables_are_errors() {
         let error = Published::parse("[[source]]\nid = 1\n")
             .unwrap_err()
             .to_string();

@@ -78,8 +78,8 @@ fn about(members: &[&Evaluation]) -> Vec<String> {
             "All rows have exactly the same ground truth (SHA-256 {}…).",
             &digest.get(..12).unwrap_or(digest)
         ),
-        None => "These files do not record their ground truth: only the protocol and the number of images are known to be \
-                 the same."
+        None => "These files do not record their ground truth: only the protocol and the number of images are known to \
+                 agree."
             .into(),
     });
     notes.push(beside_published(report));

@@ -250,14 +250,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_files_are_plain() {
+    fn file_names_have_only_plain_characters() {
         assert_eq!(slug("2011_09_26 drive/é.x"), "2011_09_26-drive-x");
         assert_eq!(slug("..//"), "");
         assert!(slug(&"a".repeat(99)).len() == 40);
     }
 
     #[test]
-    fn a_files_digest_is_the_published_one() {
+    fn sha256_equals_the_published_digest() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("abc");
         std::fs::write(&path, "abc").unwrap();

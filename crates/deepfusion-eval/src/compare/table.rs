@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn the_best_is_what_is_printed_as_the_best() {
+    fn ranks_follow_the_printed_digits() {
         use Rank::{Best, None, Second};
         let ranks = column(&table(&[
             (0.1004, true),
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_right_cannot_be_best() {
+    fn impossible_rows_are_not_ranked() {
         let mut doubtful = table(&[(0.05, true), (0.1, true), (0.2, true)]);
         doubtful.rows[0].flags.push(Flag {
             severity: Severity::Impossible,
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_footnotes_have_one_number() {
+    fn equal_footnotes_share_a_number() {
         let mut table = table(&[(0.1, true), (0.2, true)]);
         for row in &mut table.rows {
             row.source = Some("a paper".into());

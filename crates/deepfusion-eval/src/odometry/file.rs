@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_files_are_read_back() {
         let poses = path(9);
         let read = parse(&kitti_text(&poses)).unwrap();
         assert_eq!(read.format, PoseFormat::Kitti);
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_its_line() {
+    fn errors_name_the_line() {
         let good = kitti_text(&path(2));
         let scaled = "2 0 0 0 0 2 0 0 0 0 2 0\n";
         let mirrored = "-1 0 0 0 0 1 0 0 0 0 1 0\n";

@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_move_has_no_scale() {
+    fn a_standing_camera_has_no_scale() {
         let track = TrackPair::new("d", straight(6, 0.01), straight(6, 1.0)).unwrap();
         assert_eq!(Local::of(&[track]).scale(), None);
         let track = TrackPair::new("d", straight(6, 1.0), straight(6, 0.0)).unwrap();

@@ -115,7 +115,7 @@ mod tests {
     use nalgebra::Vector3;
 
     #[test]
-    fn chained_motions_are_the_path_they_came_from() {
+    fn chaining_motions_restores_the_trajectory() {
         let path: Vec<Se3> = (0..6)
             .map(|i| {
                 let t = f64::from(i);

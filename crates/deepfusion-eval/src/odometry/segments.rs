@@ -89,7 +89,7 @@ mod tests {
     /// A trajectory that is 2 % too long. Stretches end at the first frame beyond their length, so with frames a metre apart the drift over
     /// 100 m is 2 % of 101 m.
     #[test]
-    fn a_scale_error_is_its_own_drift() {
+    fn a_scale_error_gives_the_same_drift() {
         let track = TrackPair::new("d", straight(152, 1.0), straight(152, 1.02)).unwrap();
         let segments = Segments::of(&[track]);
         assert!(!segments.short());

@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn small_steps_slopes_and_flat_maps_have_none() {
+    fn small_steps_slopes_and_flat_maps_have_no_edges() {
         // With a range of 1, a step of 0.1 is below the 0.15 of the high threshold.
         let small = |x: usize| match x {
             0 => 0.0,
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_border_of_a_hole_is_no_edge() {
+    fn the_border_of_a_hole_is_not_an_edge() {
         // The 1e9 in the hole must be ignored, and the step inside the hole must stay invisible.
         let step = |x: usize| match x {
             10..14 => 1e9,

@@ -75,7 +75,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_pixel_has_the_distance_that_a_search_finds(
+        fn distances_equal_a_brute_force_search(
             width in 1..12usize, height in 1..12usize, bits in prop::collection::vec(0..9u8, 144),
         ) {
             let marked: Vec<bool> = bits[..width * height].iter().map(|b| *b == 0).collect();

@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_constant_stays_one_beside_holes_and_borders() {
+    fn a_constant_map_stays_constant_beside_holes_and_borders() {
         let known: Vec<bool> = (0..63).map(|i| i % 9 != 4).collect();
         let values: Vec<f64> = known.iter().map(|k| if *k { 7.0 } else { 1e9 }).collect();
         for v in gaussian(&values, &known, (9, 7), 1.4) {

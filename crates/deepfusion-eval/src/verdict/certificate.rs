@@ -165,14 +165,14 @@ mod tests {
     }
 
     #[test]
-    fn students_t_is_that_of_the_tables() {
+    fn students_t_equals_published_tables() {
         for (freedom, table) in [(3, 3.182), (5, 2.571), (9, 2.262), (30, 2.042)] {
             assert!((t_975(freedom) / table - 1.0).abs() < 0.01, "{freedom}");
         }
     }
 
     #[test]
-    fn the_interval_holds_the_truth_as_often_as_it_says() {
+    fn the_interval_has_its_nominal_coverage() {
         // Blocks with a known bias; the interval from the statistics alone.
         let mut random = SplitMix64(5);
         let mut uniform = || random.below(1 << 30) as f64 / f64::from(1 << 30);
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn a_speed_that_is_not_sure_widens_and_few_blocks_say_nothing() {
+    fn an_uncertain_speed_widens_the_interval_and_few_blocks_give_none() {
         let scales = [0.01, -0.01, 0.02, 0.0, -0.02, 0.01];
         let exact = ScaleCertificate::of(&blocks(&scales), 0.0).unwrap();
         let given = ScaleCertificate::of(&blocks(&scales), 0.03).unwrap();
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn verdicts() {
+    fn verdicts_follow_from_the_interval() {
         let of = |shift: f64| {
             let scales: Vec<f64> = (0..9).map(|i| shift + 0.002 * f64::from(i % 3)).collect();
             ScaleCertificate::of(&blocks(&scales), 0.02).unwrap()

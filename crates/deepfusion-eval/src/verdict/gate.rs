@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn what_became_worse_is_named() {
+    fn worsened_checks_are_reported() {
         let before = verdict(0.10, 0.03, 0.05);
         assert_eq!(names(before.worse(&before)), []);
         assert_eq!(names(before.worse(&verdict(0.09, 0.034, -0.06))), []);
@@ -181,7 +181,7 @@ mod tests {
 
     /// Depth so near that every pixel is warped out of the image has no reprojection error at all.
     #[test]
-    fn what_gives_no_figure_any_more_is_worse() {
+    fn a_check_that_lost_its_value_is_worse() {
         let before = verdict(0.10, 0.03, 0.05);
         let mut blind = verdict(0.10, 0.01, 0.05);
         blind.scale_certificate = None;

@@ -95,7 +95,7 @@ mod tests {
 
     /// A point 12 m ahead and 3 m to the right, as in a file of nuScenes.
     #[test]
-    fn a_scan_of_nuscenes_is_turned_to_look_along_x() {
+    fn a_scan_of_nuscenes_is_rotated_to_kittis_axes() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let values: [f32; 5] = [3.0, 12.0, -1.5, 40.0, 7.0];
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();

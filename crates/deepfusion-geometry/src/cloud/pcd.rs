@@ -69,7 +69,7 @@ mod tests {
 
     /// The file that `tests/reference/pcd.py` (pypcd4) writes for the same points.
     #[test]
-    fn it_is_what_pypcd4_reads_and_writes() {
+    fn files_equal_those_of_pypcd4() {
         let mut bytes = Vec::new();
         cloud().write_pcd(&mut bytes).unwrap();
         let reference = include_bytes!("../../tests/reference/cloud.pcd");

@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_said() {
+    fn unsupported_files_are_errors_with_the_reason() {
         let message = |bytes: &[u8]| PointCloud::read_ply(bytes).unwrap_err().to_string();
         assert!(message(b"P6\n").contains("begin with 'ply'"));
         assert!(message(b"ply\nformat ascii 1.0\nend_header\n").contains("ascii"));

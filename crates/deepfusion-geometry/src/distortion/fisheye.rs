@@ -75,7 +75,7 @@ mod tests {
         }
 
         #[test]
-        fn any_numbers_end(k in proptest::array::uniform4(-5.0..5.0f64), x in -5.0..5.0f64, y in -5.0..5.0f64) {
+        fn any_input_terminates(k in proptest::array::uniform4(-5.0..5.0f64), x in -5.0..5.0f64, y in -5.0..5.0f64) {
             let seen = Vector2::new(x, y);
             if let Some(ideal) = undistort(&k, &seen) {
                 // tan θ is steep near 90 degrees, where a double's last digit is 1e-4 of the point, but not of the angle.

@@ -61,8 +61,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_a_trace() {
-        for (note, said) in [
+    fn notes_on_a_trace_as_text() {
+        for (note, text) in [
             (
                 CanNote::Signal {
                     signal: "Wheels.Speed".into(),
@@ -88,7 +88,7 @@ mod tests {
                 "left out, as outside the signal's range: 1 frame",
             ),
         ] {
-            assert_eq!(note.to_string(), said);
+            assert_eq!(note.to_string(), text);
         }
     }
 }

@@ -23,7 +23,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_taken_for_granted_is_said() {
+    fn assumptions_about_the_clock_as_text() {
         assert_eq!(
             ClockNote::NoZone.to_string(),
             "the log's dates have no time zone and are taken as UTC, as the video's are"

@@ -55,13 +55,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_fixes() {
+    fn notes_on_fixes_as_text() {
         let speeds = |measured| FixesNote::Speeds {
             measured,
             sigma_mps: 0.123,
         };
         let fix_rows = |of_satellites| FixesNote::FixRows { of_satellites };
-        for (note, said) in [
+        for (note, text) in [
             (
                 speeds(true),
                 "speeds as the receiver measured them, with a median standard deviation of 0.12 m/s",
@@ -87,7 +87,7 @@ mod tests {
                 "speeds of the Fix rows of any provider: none is from GPS alone",
             ),
         ] {
-            assert_eq!(note.to_string(), said);
+            assert_eq!(note.to_string(), text);
         }
     }
 }

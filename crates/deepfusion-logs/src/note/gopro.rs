@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_its_receiver() {
+    fn notes_on_the_receiver_as_text() {
         let (without, stretches) = (2, 60);
         assert_eq!(
             GoproNote::Gps { readings: 1080 }.to_string(),

@@ -145,7 +145,7 @@ mod tests {
     fn the_columns_are_named() {
         let time = || "Time (s)".to_owned();
         let unit = SpeedUnit::MilesPerHour;
-        for (note, said) in [
+        for (note, text) in [
             (
                 TableNote::Column {
                     time: time(),
@@ -192,14 +192,14 @@ mod tests {
                 "yaw rate from column 'yaw_rate_dps', taken as positive to the left: if it is not, change its sign",
             ),
         ] {
-            assert_eq!(note.to_string(), said);
+            assert_eq!(note.to_string(), text);
         }
     }
 
     #[test]
     fn rows_are_counted() {
         let rows = 20;
-        for (note, said) in [
+        for (note, text) in [
             (
                 TableNote::HeaderAgain { more: 3 },
                 "the header is repeated 3 times among the rows",
@@ -250,7 +250,7 @@ mod tests {
                 "left out, as they have no valid latitude and longitude: 1 of 1 row",
             ),
         ] {
-            assert_eq!(note.to_string(), said);
+            assert_eq!(note.to_string(), text);
         }
     }
 }

@@ -39,9 +39,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_of_turns() {
+    fn notes_on_turns_as_text() {
         let about = TurnsNote::AboutGravity;
-        for (note, said) in [
+        for (note, text) in [
             (
                 TurnsNote::NoGravity,
                 "the accelerations do not include gravity: which way is up, and so how the vehicle turned, is unknown",
@@ -59,7 +59,7 @@ mod tests {
                 "yaw rate from the gyroscope about gravity's axis; its sign is reversed to agree with the GPS course",
             ),
         ] {
-            assert_eq!(note.to_string(), said);
+            assert_eq!(note.to_string(), text);
         }
     }
 }

@@ -62,12 +62,12 @@ pub enum NmeaProblem {
     #[error("{0}")]
     Sentence(String),
     /// The checksum of a sentence is wrong.
-    #[error("the checksum is {found:02X}, not {said:02X}")]
+    #[error("the checksum is {found:02X}, the sentence says {stated:02X}")]
     Checksum {
         /// The checksum of its characters.
         found: u8,
         /// The checksum written in it.
-        said: u8,
+        stated: u8,
     },
     /// The date has more nanoseconds since 1970 than an `i64` holds.
     #[error("its date is after the year 2262")]

@@ -175,6 +175,7 @@ fn id(id: MessageId) -> CanId {
         MessageId::Extended(id) => CanId::Extended { extended: id },
     }
 }
+
 /// The smallest and the largest value; `[0|0]` means that the file gives no range.
 fn range(signal: &can_dbc::Signal) -> Option<[f64; 2]> {
     let number = |value: &NumericValue| match *value {

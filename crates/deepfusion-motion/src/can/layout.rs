@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_words_are_what_the_standard_library_reads() {
+    fn whole_words_equal_the_standard_librarys() {
         let data = [0x12, 0x34, 0x56, 0x78, 0x9a, 0xbc, 0xde, 0xf0];
         let intel = |s, n, k| layout(s, n, ByteOrder::Intel, k).decode(&data).unwrap();
         let motorola = |s, n, k| layout(s, n, ByteOrder::Motorola, k).decode(&data).unwrap();

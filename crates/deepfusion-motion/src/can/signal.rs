@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_bus_sends_for_none_is_no_value() {
+    fn values_for_not_available_are_dropped() {
         let mut speed: CanSignal = toml::from_str(CONFIG).unwrap();
         let (own, later) = (CanId::Standard(0x158), [0x0e, 0x10, 0]);
         let frame = |step: u8, data| CanFrame {

@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn four_wheels_stand_in_for_the_speed() {
+    fn wheel_speeds_replace_a_missing_speed() {
         let dir = tempfile::tempdir().unwrap();
         let can = dir.path().join("processed_log/CAN");
         let rows = vec![vec![9.0, 11.0, 10.0, 10.4]; 50];
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_or_does_not_fit_is_named() {
+    fn missing_and_mismatched_arrays_are_named() {
         let dir = tempfile::tempdir().unwrap();
         let error = CommaSegment::open(dir.path()).unwrap_err();
         assert!(error.to_string().contains("CAN/speed/t"), "{error}");

@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_rows_in_either_order_of_storage() {
+    fn rows_are_read_in_either_storage_order() {
         let rows = Array2::from_shape_fn((4, 3), |(r, c)| (10 * r + c) as f64);
         let mut columns = Array2::zeros((4, 3).f());
         columns.assign(&rows);
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_that_lies_about_lengths_allocates_nothing() {
+    fn a_header_with_wrong_lengths_allocates_nothing() {
         let mut file = b"\x93NUMPY\x02\x00".to_vec();
         file.extend([0xff, 0xff, 0xff, 0x7f]);
         let error = Table::parse(&file, 1).unwrap_err();

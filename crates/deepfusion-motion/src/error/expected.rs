@@ -111,9 +111,9 @@ mod tests {
     use super::{ExpectedLayout, ExpectedSetting as Expected};
 
     #[test]
-    fn a_setting_is_said_in_words_with_its_unit() {
+    fn expected_settings_as_text_with_their_unit() {
         let (from, to) = (0.05, 60.0);
-        for (expected, said) in [
+        for (expected, text) in [
             (Expected::AboveZero, "above 0"),
             (Expected::Within { from, to }, "0.05 to 60"),
             (Expected::Metres { from, to }, "0.05 to 60 m"),
@@ -137,13 +137,13 @@ mod tests {
             ),
             (Expected::AllPixels, "width × height"),
         ] {
-            assert_eq!(expected.to_string(), said);
+            assert_eq!(expected.to_string(), text);
         }
     }
 
     #[test]
-    fn a_layout_is_said_in_bits_and_bytes() {
-        for (expected, said) in [
+    fn expected_layouts_as_text_in_bits_and_bytes() {
+        for (expected, text) in [
             (ExpectedLayout::Bits { from: 1, to: 64 }, "1 to 64 bits"),
             (ExpectedLayout::FloatBits(32), "32 bits for float32"),
             (
@@ -152,7 +152,7 @@ mod tests {
             ),
             (ExpectedLayout::Finite, "a finite number"),
         ] {
-            assert_eq!(expected.to_string(), said);
+            assert_eq!(expected.to_string(), text);
         }
     }
 }

@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_speed_nothing_stands() {
+    fn without_a_speed_there_is_no_standstill() {
         let (samples, _) = drive(0.0);
         let config = StandstillConfig::default();
         assert!(standstills(&samples, &Signal::default(), &config).is_empty());

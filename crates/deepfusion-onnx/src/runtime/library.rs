@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn versions() {
+    fn versions_are_compared_by_their_second_number() {
         for (version, expected) in [
             ("1.31.1", true),
             ("1.17.0", true),

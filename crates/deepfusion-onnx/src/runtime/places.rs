@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wheel_of_a_python_is_found() {
+    fn the_library_of_a_python_wheel_is_found() {
         let prefix = tempfile::tempdir().unwrap();
         let capi = prefix
             .path()

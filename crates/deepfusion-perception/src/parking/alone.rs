@@ -26,7 +26,7 @@ fn is_open(detection: &Detection, view: &View) -> bool {
         let right = (last, Some(last + BESIDE).filter(|u| *u < width));
         for (closed, (edge, beside)) in closed.iter_mut().zip([left, right]) {
             let pixel = |u: u32| (row[0].v * width + u) as usize;
-            let goes_on = beside.is_none_or(|u| may_go_on(pixel(edge), pixel(u), view));
+            let goes_on = beside.is_none_or(|u| may_continue(pixel(edge), pixel(u), view));
             *closed += usize::from(goes_on);
         }
     }
@@ -34,7 +34,7 @@ fn is_open(detection: &Detection, view: &View) -> bool {
 }
 
 /// Whether the object in one pixel may continue at another: something nearer is there, or an obstacle at the same distance.
-fn may_go_on(from: usize, at: usize, view: &View) -> bool {
+fn may_continue(from: usize, at: usize, view: &View) -> bool {
     let (here, there) = (view.depth[from], view.depth[at]);
     let step = 0.4 + 0.01 * here;
     let obstacle = view.obstacles.height[at] != NONE;
@@ -47,7 +47,7 @@ mod tests {
     use crate::parking::scene::{Scene, person};
 
     #[test]
-    fn what_is_hidden_on_a_side_or_large_does_not_stand_alone() {
+    fn hidden_or_large_objects_do_not_stand_alone() {
         let small = person([0.0, 12.0]);
         let mut beside = person([-0.7, 10.0]);
         let alone = |boxes: &[_]| {

@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn neighbouring_pixels_are_runs() {
+    fn adjacent_pixels_are_joined_into_runs() {
         let made = cluster(&[8, 9, 10, 13, 20], 10);
         let runs: Vec<_> = made.runs.iter().map(|r| (r.v, r.from, r.to)).collect();
         assert_eq!(runs, [(0, 8, 10), (1, 0, 1), (1, 3, 4), (2, 0, 1)]);

@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_tells_where_one_stands_that_was_taken_for_something_else() {
+    fn a_row_corrects_a_misdetected_car() {
         let scene = Scene::of(&[8.0, 11.0, 14.0, 17.0].map(car));
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_is_believed_once_its_cars_were_seen_again_and_only_with_a_pose() {
+    fn a_row_is_used_after_repeated_sightings_and_only_with_a_pose() {
         let scene = Scene::of(&[car(17.0)]);
         let pose = Se3::identity();
         // A strip of the next car, detected as something else.
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_car_of_a_row_explains_stays() {
+    fn detections_that_no_row_explains_are_kept() {
         let scene = Scene::of(&[]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn who_stands_in_a_row_or_before_a_car_of_it_stays() {
+    fn people_in_or_before_a_row_are_kept() {
         let cars = [8.0, 11.0, 14.0].map(car);
         // Beyond the last car; between two cars; in front of the hood of a car that the row contains.
         for middle in [[4.0, 19.0], [3.5, 12.5], [3.3, 13.9]] {
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_and_what_is_known_by_name_stays_as_it_is() {
+    fn dynamic_and_classified_detections_are_kept() {
         let scene = Scene::of(&[car(17.0)]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn in_a_row_things_are_turned_square_to_the_lane() {
+    fn boxes_in_a_row_are_turned_square_to_the_lane() {
         let scene = Scene::of(&[]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));

@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn the_flat_face_of_a_hedge_is_no_car() {
+    fn the_flat_face_of_a_hedge_is_not_a_car() {
         let mut face = place();
         face.seen[0] = 0.05;
         assert!(parked(&face).is_some());
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn one_that_is_seen_again_is_the_mean_of_both() {
+    fn sightings_of_one_car_are_averaged() {
         let mut cars = vec![parked(&place()).unwrap()];
         let mut again = cars[0];
         again.middle[1] += 0.4;
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn what_drives_ahead_shows_how_the_lane_goes() {
+    fn a_vehicle_ahead_shows_the_lanes_direction() {
         let mut driven = place();
         driven.middle = [1.0, 15.0];
         driven.angle = FRAC_PI_2 - 0.2;

@@ -37,7 +37,7 @@ const SURE: f32 = 2.0;
 /// How far a row is searched before its first car, and beyond its last car or the last one across the lane, in metres.
 const BEFORE_M: f32 = 10.0;
 /// See [`BEFORE_M`].
-const GOES_ON_M: f32 = 15.0;
+const CONTINUES_M: f32 = 15.0;
 /// Weight of a vehicle driving along the lane for the lane's curvature, in sightings of a car, at any distance.
 const DRIVEN: f32 = 2.0;
 /// Smallest distance between two rows, in metres.
@@ -221,7 +221,7 @@ impl Row {
     pub(super) fn end(&self) -> f32 {
         let all = self.cars.iter().chain(&self.across);
         let last = all.map(|car| car.middle[1]);
-        last.fold(f32::NEG_INFINITY, f32::max) + GOES_ON_M
+        last.fold(f32::NEG_INFINITY, f32::max) + CONTINUES_M
     }
 
     /// Whether this forward position is within the search range.
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn both_sides_of_a_lane_are_rows_and_a_car_in_it_is_none() {
+    fn both_sides_of_a_lane_are_rows_but_a_car_in_it_is_not() {
         let cars = [
             car(6.0, 4.0, 0.0),
             car(-6.1, 6.0, 0.0),
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_goes_on_as_its_cars_are_turned() {
+    fn a_row_continues_in_the_direction_of_its_cars() {
         let row = Row::through(vec![car(5.0, 5.0, 0.1), car(5.3, 8.0, 0.1)]);
         assert!((row.slope(10.0) - 0.1).abs() < 0.02, "{row:?}");
         let [along, off] = row.locate([row.at(10.0) + 1.0, 10.0]);
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_bends_as_what_drives_along_the_lane_shows() {
+    fn a_row_bends_with_vehicles_along_the_lane() {
         let mut row = Row::through(vec![car(6.0, 2.0, 0.0), car(6.0, 5.0, 0.0)]);
         let straight = row.at(24.0);
         row.keep_to(&[Heading {
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_bends_as_the_one_across_the_lane_does() {
+    fn a_row_bends_like_the_one_across_the_lane() {
         // A bend of 40 m radius; the left row shows more of it.
         let turn = |forward: f32| forward / 40.0;
         let on = |right: f32, forward: f32| {

@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_on_a_row_is_parted_by_its_gaps() {
+    fn obstacles_on_a_row_are_split_at_gaps() {
         let scene = Scene::of(&[]);
         let standing = standing(&[[9.0, 10.8, 2.0], [11.4, 13.2, 2.0]]);
         let parts = standing.segments(&row(), [6.0, 20.0], &scene.view());
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn cars_doors_to_doors_are_separated_by_their_width_and_a_wall_is_none() {
+    fn cars_side_by_side_are_split_by_width_and_a_wall_is_not_a_car() {
         let scene = Scene::of(&[]);
         let count = |piece: [f32; 3]| {
             let parts = standing(&[piece]).segments(&row(), [6.0, 40.0], &scene.view());
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_side_that_is_seen_says_how_the_row_is_turned() {
+    fn a_visible_side_gives_the_rows_direction() {
         let scene = Scene::of(&[]);
         // The side towards the camera, turned by 0.15 like the whole car.
         let points = (0..400).map(|i| {

@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_steady_motion_is_found_within_its_own_doubt() {
+    fn a_constant_velocity_is_found_within_its_uncertainty() {
         let noise = Matrix2::identity() * 0.04;
         let truth = Vector2::new(-3.0, 9.0);
         let at = |i: i32| Vector2::new(2.0, 20.0) + truth * 0.1 * f64::from(i);
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn doubt_grows_while_nothing_is_seen() {
+    fn uncertainty_grows_without_measurements() {
         let noise = Matrix2::identity() * 0.01;
         let mut filter = Kalman::new(Vector2::zeros(), &noise);
         let far = Vector2::new(1.0, 0.0);

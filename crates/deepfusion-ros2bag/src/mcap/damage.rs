@@ -13,8 +13,8 @@ pub struct McapDamage {
 
 impl fmt::Display for McapDamage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let said: Vec<String> = self.problems.iter().map(McapProblem::to_string).collect();
-        f.write_str(&said.join("; "))
+        let messages: Vec<String> = self.problems.iter().map(McapProblem::to_string).collect();
+        f.write_str(&messages.join("; "))
     }
 }
 

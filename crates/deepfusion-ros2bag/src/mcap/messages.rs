@@ -203,7 +203,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_messages_of_a_time_are_those_that_it_contains() {
+    fn a_time_range_selects_the_messages_within_it() {
         let entry = |(place, ns): (usize, u64)| Entry {
             time: Time::from_nanos(ns),
             channel: 0,

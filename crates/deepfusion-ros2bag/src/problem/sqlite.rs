@@ -4,7 +4,7 @@ use crate::storage::COPY_AGAIN;
 use rusqlite::ErrorCode;
 
 /// What an error of SQLite's means for a bag.
-pub(super) fn said(e: &rusqlite::Error) -> String {
+pub(super) fn message(e: &rusqlite::Error) -> String {
     match e.sqlite_error_code() {
         Some(ErrorCode::NotADatabase) => "not an SQLite database".to_owned(),
         Some(ErrorCode::DatabaseCorrupt) => format!("the database is damaged: {e}"),

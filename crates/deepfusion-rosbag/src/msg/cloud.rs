@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_come_back_by_name() {
+    fn columns_are_read_by_name() {
         let velocity: Vec<f32> = cloud().column("velocity").unwrap().f32s().collect();
         assert_eq!(velocity, [-0.5, 0.0, 7.25]);
         let error = cloud().column("Velocity").unwrap_err().to_string();
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn layouts_that_lie_are_errors() {
+    fn wrong_layouts_are_errors() {
         let broken = |change: fn(&mut PointCloud2<'_>)| {
             let mut cloud = cloud();
             change(&mut cloud);

@@ -308,7 +308,7 @@ mod tests {
 
     /// The encodings that the hint lists are read; others are not.
     #[test]
-    fn the_list_of_what_is_read_is_true() {
+    fn the_list_of_readable_encodings_is_correct() {
         let names = |list: &'static str| list.split(',').map(str::trim);
         for name in names(PICTURES) {
             let rgb = image(name, 2, 2, 8, &[0; 16]).to_rgb8();
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_that_lie_are_errors() {
+    fn wrong_sizes_are_errors() {
         let rows = |width, height, step| {
             image("rgb8", width, height, step, &[0; 12])
                 .rows()
@@ -374,7 +374,7 @@ mod tests {
     proptest::proptest! {
         /// Whatever a driver claims, the result has all pixels or is an error.
         #[test]
-        fn no_claim_panics(number in 0usize..40, width in 0..12u32, height in 0..12u32, step in 0..40u32, data in proptest::collection::vec(0..=255u8, 0..300), big in 0..2u8) {
+        fn no_claimed_size_panics(number in 0usize..40, width in 0..12u32, height in 0..12u32, step in 0..40u32, data in proptest::collection::vec(0..=255u8, 0..300), big in 0..2u8) {
             let names: Vec<&str> = PICTURES.split(',').chain(NUMBERS.split(',')).collect();
             let name = names[number % names.len()].trim();
             let picture = Image { is_bigendian: big, ..image(name, width, height, step, &data) };

@@ -274,7 +274,7 @@ impl<'a, T: Wire<'a>> Wire<'a> for Vec<T> {
 }
 
 /// A struct of fields in the order of the wire, with its reader and writer. With `= "type" "md5" definition` after
-/// its name, it is a message that can have a topic.
+/// its name, it is a message that a topic can have.
 macro_rules! message {
     (
         $(#[$about:meta])*

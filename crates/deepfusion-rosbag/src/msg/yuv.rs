@@ -39,7 +39,7 @@ mod tests {
 
     /// The pure colours of BT.601: red is (81, 90, 240), blue (41, 240, 110).
     #[test]
-    fn pure_colours_come_back() {
+    fn pure_colours_round_trip() {
         assert_eq!(pair([81, 81], 90, 240)[..3], [254, 0, 0]);
         assert_eq!(pair([41, 41], 240, 110)[..3], [0, 0, 255]);
     }

@@ -116,13 +116,13 @@ impl Lines for Vec<PointField> {
 }
 
 macro_rules! fields {
-    ($($kind:ty: $($field:ident $(as $said:literal)?),*;)*) => {$(
+    ($($kind:ty: $($field:ident $(as $label:literal)?),*;)*) => {$(
         impl Lines for $kind {
             fn lines(&self, name: &str, out: &mut Vec<String>) {
                 let dot = if name.is_empty() { "" } else { "." };
                 $({
-                    let said = [$($said,)? stringify!($field)][0];
-                    self.$field.lines(&format!("{name}{dot}{said}"), out);
+                    let label = [$($label,)? stringify!($field)][0];
+                    self.$field.lines(&format!("{name}{dot}{label}"), out);
                 })*
             }
         }

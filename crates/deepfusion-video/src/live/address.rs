@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_is_asked_for_what_stands_behind_its_name() {
+    fn settings_after_a_cameras_name_are_requested() {
         let full = "-f v4l2 -input_format mjpeg -framerate 30 -video_size 1920x1080 -i /dev/video0";
         for name in ["camera:0", "/dev/video0"] {
             let asked = format!("{name}?size=1920x1080&fps=30&format=mjpeg");
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_have_no_end() {
+    fn cameras_may_not_end() {
         let may_end = |text| Address::parse(text).unwrap().may_end();
         assert!(may_end("-") && may_end("http://host/a.ts") && may_end("tcp://host:1"));
         assert!(!may_end("camera:0") && !may_end("/dev/video0") && !may_end("RTSP://host/1"));
@@ -282,9 +282,9 @@ mod tests {
     fn passwords_are_not_shown() {
         let address = Address::parse("rtsp://me:p@ss@cam.local:554/live").unwrap();
         assert_eq!(address.to_string(), "rtsp://***@cam.local:554/live");
-        let said =
+        let shown =
             address.without_password("rtsp://me:p@ss@cam.local:554/live: Connection refused");
-        assert_eq!(said, "rtsp://***@cam.local:554/live: Connection refused");
+        assert_eq!(shown, "rtsp://***@cam.local:554/live: Connection refused");
         assert_eq!(
             input("rtsp://me:p@ss@cam.local:554/live", "linux"),
             "-rtsp_transport tcp -i rtsp://me:p@ss@cam.local:554/live"

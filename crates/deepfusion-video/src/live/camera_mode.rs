@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn each_device_has_its_own_words() {
+    fn each_device_has_its_own_options() {
         let all = "size=1920x1080&fps=29.97&format=mjpeg";
         let sizes = "-framerate 29.97 -video_size 1920x1080";
         assert_eq!(options(all, "v4l2"), format!("-input_format mjpeg {sizes}"));
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_understood_is_named() {
+    fn invalid_settings_are_named() {
         let problem = |text: &str| CameraMode::parse(text).unwrap_err();
         assert_eq!(
             problem("size=1x1&rate=5"),

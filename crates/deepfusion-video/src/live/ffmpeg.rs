@@ -24,7 +24,7 @@ const GRACE: Duration = Duration::from_secs(2);
 pub(super) struct Ffmpeg {
     child: Child,
     slot: Arc<Slot>,
-    said: Arc<Mutex<VecDeque<String>>>,
+    lines: Arc<Mutex<VecDeque<String>>>,
     listener: Option<JoinHandle<()>>,
 }
 
@@ -32,7 +32,7 @@ pub(super) struct Ffmpeg {
 #[derive(Debug)]
 pub(super) struct FfmpegExit {
     pub(super) code: Option<i32>,
-    pub(super) said: Vec<String>,
+    pub(super) lines: Vec<String>,
 }
 
 impl Ffmpeg {
@@ -70,19 +70,19 @@ impl Ffmpeg {
             not_started(Path::new(&name), "ffmpeg", e, ProgramTask::ReadLive)
         })?;
         let slot = Arc::new(Slot::new());
-        let said = Arc::new(Mutex::new(VecDeque::new()));
+        let lines = Arc::new(Mutex::new(VecDeque::new()));
         if let Some(pipe) = child.stdout.take() {
             let slot = slot.clone();
             std::thread::spawn(move || read_frames(pipe, &slot));
         }
         let listener = child.stderr.take().map(|pipe| {
-            let said = said.clone();
-            std::thread::spawn(move || listen(pipe, &said))
+            let lines = lines.clone();
+            std::thread::spawn(move || listen(pipe, &lines))
         });
         Ok(Self {
             child,
             slot,
-            said,
+            lines,
             listener,
         })
     }
@@ -107,14 +107,14 @@ impl Ffmpeg {
             }
             std::thread::sleep(Duration::from_millis(5));
         }
-        let said = self.said();
-        FfmpegExit { code, said }
+        let lines = self.last_lines();
+        FfmpegExit { code, lines }
     }
 
     /// The last lines that it has printed so far.
-    pub(super) fn said(&self) -> Vec<String> {
-        let said = self.said.lock().unwrap_or_else(PoisonError::into_inner);
-        said.iter().cloned().collect()
+    pub(super) fn last_lines(&self) -> Vec<String> {
+        let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
+        lines.iter().cloned().collect()
     }
 }
 
@@ -152,7 +152,7 @@ fn read_frames(pipe: impl Read, slot: &Slot) {
 }
 
 /// Keeps the last lines that it prints.
-fn listen(pipe: impl Read, said: &Mutex<VecDeque<String>>) {
+fn listen(pipe: impl Read, lines: &Mutex<VecDeque<String>>) {
     for line in BufReader::new(pipe)
         .split(b'\n')
         .map_while(std::io::Result::ok)
@@ -161,11 +161,11 @@ fn listen(pipe: impl Read, said: &Mutex<VecDeque<String>>) {
         if line.is_empty() {
             continue;
         }
-        let mut said = said.lock().unwrap_or_else(PoisonError::into_inner);
-        if said.len() == LINES {
-            said.pop_front();
+        let mut lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
+        if lines.len() == LINES {
+            lines.pop_front();
         }
-        said.push_back(line);
+        lines.push_back(line);
     }
 }
 
@@ -184,18 +184,18 @@ const LOSSES: [&str; 7] = [
 impl FfmpegExit {
     /// Whether it ended because its source ended.
     pub(super) fn is_clean(&self) -> bool {
-        self.code == Some(0) && !self.said_one_of(&LOSSES)
+        self.code == Some(0) && !self.printed_one_of(&LOSSES)
     }
 
     /// Whether it is too old for `-fps_mode`.
-    pub(super) fn knows_no_option(&self) -> bool {
-        self.said_one_of(&["'fps_mode'"])
+    pub(super) fn is_too_old(&self) -> bool {
+        self.printed_one_of(&["'fps_mode'"])
     }
 
     /// Whether one of the texts is in its output.
-    pub(super) fn said_one_of(&self, texts: &[&str]) -> bool {
-        let mut said = self.said.iter();
-        said.any(|line| texts.iter().any(|text| line.contains(text)))
+    pub(super) fn printed_one_of(&self, texts: &[&str]) -> bool {
+        let mut lines = self.lines.iter();
+        lines.any(|line| texts.iter().any(|text| line.contains(text)))
     }
 }
 
@@ -203,10 +203,10 @@ impl FfmpegExit {
 mod tests {
     use super::*;
 
-    fn end(code: i32, said: &[&str]) -> FfmpegExit {
+    fn end(code: i32, lines: &[&str]) -> FfmpegExit {
         FfmpegExit {
             code: Some(code),
-            said: said.iter().map(|s| (*s).to_owned()).collect(),
+            lines: lines.iter().map(|s| (*s).to_owned()).collect(),
         }
     }
 
@@ -222,16 +222,16 @@ mod tests {
             )
             .is_clean()
         );
-        assert!(end(1, &["Unrecognized option 'fps_mode'."]).knows_no_option());
+        assert!(end(1, &["Unrecognized option 'fps_mode'."]).is_too_old());
     }
 
     #[test]
-    fn only_the_last_words_are_kept() {
-        let said = Mutex::new(VecDeque::new());
+    fn only_the_last_lines_are_kept() {
+        let lines = Mutex::new(VecDeque::new());
         let text: String = (0..50).map(|i| format!("line {i}\n\n")).collect();
-        listen(text.as_bytes(), &said);
-        let said = said.into_inner().unwrap();
-        assert_eq!(said.len(), LINES);
-        assert_eq!(said.back().unwrap(), "line 49");
+        listen(text.as_bytes(), &lines);
+        let lines = lines.into_inner().unwrap();
+        assert_eq!(lines.len(), LINES);
+        assert_eq!(lines.back().unwrap(), "line 49");
     }
 }

@@ -89,7 +89,7 @@ impl LiveSource {
     fn ended(&mut self, problem: Option<Arc<LiveFrameProblem>>) -> Result<NextFrame> {
         let end = self.ffmpeg.end();
         let came = self.ffmpeg.slot().arrived();
-        if came == 0 && !self.old_names && end.knows_no_option() {
+        if came == 0 && !self.old_names && end.is_too_old() {
             // ffmpeg checks its arguments before it opens anything, so the source was not opened.
             self.old_names = true;
             self.ffmpeg = Ffmpeg::start(&self.address, true)?;
@@ -105,7 +105,7 @@ impl LiveSource {
             kind: self.address.kind(),
             frames: came,
             code: end.code,
-            said: self.without_password(&end.said),
+            lines: self.without_password(&end.lines),
         }))
     }
 
@@ -115,13 +115,13 @@ impl LiveSource {
             address: self.address.to_string(),
             waited: self.timeout,
             frames: self.ffmpeg.slot().arrived(),
-            said: self.without_password(&self.ffmpeg.said()),
+            lines: self.without_password(&self.ffmpeg.last_lines()),
         }
     }
 
-    fn without_password(&self, said: &[String]) -> Vec<String> {
-        let lines = said.iter();
+    fn without_password(&self, lines: &[String]) -> Vec<String> {
         lines
+            .iter()
             .map(|line| self.address.without_password(line))
             .collect()
     }

@@ -70,7 +70,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn pictures_follow_each_other() {
+    fn consecutive_pictures_are_read() {
         let stream = b"P6\n2 1\n255\nabcdefP6\n1 1\n255\n\nxyP6\n1 1\n255\nq";
         let mut input = &stream[..];
         let first = read(&mut input, vec![9; 100]).unwrap().unwrap();
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_picture_is_an_error() {
+    fn invalid_pictures_are_errors() {
         for bad in [
             "JFIF\n1 1\n255\nabc",
             "P6\n0 1\n255\n",

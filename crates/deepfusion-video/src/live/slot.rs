@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn who_waits_is_woken() {
+    fn a_waiting_reader_is_woken() {
         let slot = Slot::new();
         std::thread::scope(|scope| {
             let waiting = scope.spawn(|| slot.take(Duration::from_secs(60)));

@@ -4,7 +4,7 @@
 //! that time, so a picture that it does not write is noticed by its missing name.
 
 use super::Codec;
-use crate::program::{Printed, in_either_words, outcome};
+use crate::program::{Printed, outcome, with_either_option_name};
 use crate::{Error, PacketProblem, ProgramProblem, ProgramTask, Result};
 use std::ffi::OsStr;
 use std::fs::File;
@@ -136,8 +136,8 @@ impl<'a> Batch<'a> {
         if printed.succeeded && printed.complaint.is_empty() && numbers.clone().all(|i| there(&i)) {
             return Ok(None);
         }
-        let said = &printed.complaint;
-        if let Some(own) = said
+        let message = &printed.complaint;
+        if let Some(own) = message
             .lines()
             .find(|line| OWN_PROBLEMS.iter().any(|p| line.contains(p)))
         {
@@ -145,21 +145,21 @@ impl<'a> Batch<'a> {
                 path: of.to_owned(),
                 program: "ffmpeg",
                 problem: ProgramProblem::Unable {
-                    said: own.trim().to_owned(),
+                    message: own.trim().to_owned(),
                 },
             });
         }
-        if said.contains("monoton") || said.contains("Invalid pts") {
+        if message.contains("monoton") || message.contains("Invalid pts") {
             return Ok(Some(PacketProblem::Reordered));
         }
         // The first line, without the name and address of the part of ffmpeg that printed it.
-        let line = said.lines().next().unwrap_or_default();
+        let line = message.lines().next().unwrap_or_default();
         let line = line.rsplit_once("] ").map_or(line, |(_, line)| line);
         Ok(Some(if line.is_empty() {
             PacketProblem::NoPicture
         } else {
-            let said = line.to_owned();
-            PacketProblem::Damaged { said }
+            let message = line.to_owned();
+            PacketProblem::Damaged { message }
         }))
     }
 }
@@ -176,8 +176,8 @@ pub(super) fn picture(
     let file = [&head(codec)[..], &packet_head(packet, 0), packet].concat();
     let printed = ffmpeg(codec, &Source::Bytes(&file), (of, Path::new(".")))?;
     Ok(if printed.text.is_empty() {
-        let said = printed.complaint;
-        Err(PacketProblem::NoFirstPicture { said })
+        let message = printed.complaint;
+        Err(PacketProblem::NoFirstPicture { message })
     } else {
         Ok(printed.text)
     })
@@ -196,7 +196,7 @@ fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Re
         Source::File(name) => (*name, None),
         Source::Bytes(bytes) => ("pipe:0", Some(*bytes)),
     };
-    in_either_words(|mode| {
+    with_either_option_name(|mode| {
         // Times stay as they are. A packet with an error gives no picture, rather than half of one.
         let mut arguments = vec!["-v", "error", "-y", "-copyts", "-err_detect", "explode"];
         if let Some(decoder) = codec.decoder() {
@@ -240,8 +240,8 @@ fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Re
     })
 }
 
-/// The file's header. The size is also in the packets, where it counts; so does the number of packets. The rate is 25 per second:
-/// [`RATE`].
+/// The file's header. The frames' size and the number of packets in it are not used, since the packets determine both. The rate is 25 per
+/// second: [`RATE`].
 fn head(codec: Codec) -> [u8; HEAD as usize] {
     let mut head = [0; HEAD as usize];
     head[..4].copy_from_slice(b"DKIF");

@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_of_rubbish_is_believed() {
+    fn packets_without_a_picture_are_empty() {
         let mut watch = PacketWatch::default();
         for packet in [
             &[][..],
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_as_long_as_they_need() {
+    fn exp_golomb_numbers_have_variable_length() {
         // 1, 010, 011, 00100, 00101: 0 to 4; then 3 bits.
         let mut bits = Bits::of(&[0b1010_0110, 0b0100_0010, 0b1101_0000], 9);
         let found: Vec<u32> = (0..5).map(|_| bits.exp_golomb().unwrap()).collect();
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_that_jumps_shows_a_gap() {
+    fn a_jump_of_the_counter_is_a_gap() {
         let first = |gaps| {
             let mut watch = PacketWatch::default();
             let packet = [baseline(gaps), picture(0, 0x65, 0)].concat();

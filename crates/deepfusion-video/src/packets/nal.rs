@@ -2,10 +2,10 @@
 
 /// A packet's units without their start codes; none is empty.
 pub(super) fn units(packet: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let mut rest = behind_start(packet);
+    let mut rest = after_start_code(packet);
     std::iter::from_fn(move || {
         let unit = rest?;
-        rest = behind_start(unit);
+        rest = after_start_code(unit);
         let length = rest.map_or(unit.len(), |next| unit.len() - next.len() - 3);
         Some(&unit[..length])
     })
@@ -13,7 +13,7 @@ pub(super) fn units(packet: &[u8]) -> impl Iterator<Item = &[u8]> {
 }
 
 /// The bytes after the first start code, 0 0 1.
-fn behind_start(bytes: &[u8]) -> Option<&[u8]> {
+fn after_start_code(bytes: &[u8]) -> Option<&[u8]> {
     let at = bytes.windows(3).position(|w| w == [0, 0, 1])?;
     Some(&bytes[at + 3..])
 }

@@ -35,10 +35,10 @@ pub enum LiveProblem {
         now: (u32, u32),
     },
     /// The data is not a frame.
-    #[error("cannot be read from: {0}")]
+    #[error("gave output that cannot be read: {0}")]
     Frame(#[source] Arc<LiveFrameProblem>),
     /// ffmpeg ended, although the source should not have.
-    #[error("{}: {}{}", happened(*frames), ended(*code), quoted(said))]
+    #[error("{}: {}{}", happened(*frames), ended(*code), quoted(lines))]
     Lost {
         /// Kind of the source.
         kind: SourceKind,
@@ -47,7 +47,7 @@ pub enum LiveProblem {
         /// ffmpeg's exit code, if it ended by itself.
         code: Option<i32>,
         /// Its last messages, without the source's password.
-        said: Vec<String>,
+        lines: Vec<String>,
     },
 }
 
@@ -81,7 +81,7 @@ impl LiveProblem {
                 kind: SourceKind::Stdin,
                 ..
             } => "pipe a format that ffmpeg knows: Motion-JPEG, MPEG-TS, YUV4MPEG, Matroska",
-            Self::Lost { said, .. } if asks_for_password(said) => {
+            Self::Lost { lines, .. } if asks_for_password(lines) => {
                 "give name and password: rtsp://NAME:PASSWORD@HOST/…"
             }
             Self::Lost {
@@ -98,17 +98,17 @@ impl LiveProblem {
     }
 }
 
-fn asks_for_password(said: &[String]) -> bool {
+fn asks_for_password(lines: &[String]) -> bool {
     let refused = |line: &String| line.contains("nauthorized") || line.contains("orbidden");
-    said.iter().any(refused)
+    lines.iter().any(refused)
 }
 
 /// ffmpeg's messages, to follow what happened.
-pub(crate) fn quoted(said: &[String]) -> String {
-    if said.is_empty() {
+pub(crate) fn quoted(lines: &[String]) -> String {
+    if lines.is_empty() {
         String::new()
     } else {
-        format!(", saying\n  {}", said.join("\n  "))
+        format!(", saying\n  {}", lines.join("\n  "))
     }
 }
 

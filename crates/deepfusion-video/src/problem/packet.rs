@@ -22,16 +22,16 @@ pub enum PacketProblem {
     #[error("it gives no picture")]
     NoPicture,
     /// The decoder gives no picture for the stream's first packet.
-    #[error("it gives no picture: {said}")]
+    #[error("it gives no picture: {message}")]
     NoFirstPicture {
         /// The decoder's message.
-        said: String,
+        message: String,
     },
     /// The decoder finds the packet damaged.
-    #[error("it is damaged, or one before it is missing: {said}")]
+    #[error("it is damaged, or one before it is missing: {message}")]
     Damaged {
         /// The decoder's message.
-        said: String,
+        message: String,
     },
     /// The stream has fewer packets than when it was opened.
     #[error(

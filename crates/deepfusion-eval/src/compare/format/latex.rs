@@ -119,12 +119,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn letters_go_on_after_z() {
+    fn letters_continue_after_z() {
         assert_eq!([1, 26, 27, 53].map(letter), ["a", "z", "aa", "ba"]);
     }
 
     #[test]
-    fn what_latex_reads_as_code_is_escaped() {
+    fn latex_special_characters_are_escaped() {
         assert_eq!(
             escaped("a_b & 50 % δ<1.25²"),
             "a\\_b \\& 50 \\% $\\delta$$<$1.25$^2$"

@@ -125,9 +125,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_against_figures() {
+    fn reasons_against_figures_as_text() {
         let cap_m = 80.0;
-        for (reason, said) in [
+        for (reason, text) in [
             (
                 FlagReason::OutOfRange {
                     metric: "abs_rel",
@@ -196,13 +196,13 @@ mod tests {
                 "every figure equals those of `DeepFusion, row 4`",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), text);
         }
     }
 
     #[test]
-    fn what_a_reader_must_know_is_said() {
-        for (reason, said) in [
+    fn notes_for_readers_as_text() {
+        for (reason, text) in [
             (
                 FlagReason::Outdated {
                     checkpoint: "best.safetensors".into(),
@@ -228,7 +228,7 @@ mod tests {
                 "read off a figure",
             ),
         ] {
-            assert_eq!(reason.to_string(), said);
+            assert_eq!(reason.to_string(), text);
         }
     }
 }
