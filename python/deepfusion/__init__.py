@@ -133,9 +133,9 @@ def evaluate(
     `names` are the images' names in messages.
     """
     if isinstance(predictions, Sized) and isinstance(ground_truth, Sized) and len(predictions) != len(ground_truth):
-        raise ValueError(f"{len(predictions)} predictions for {len(ground_truth)} images of ground truth")
+        raise ValueError(f"predictions: expected {len(ground_truth)}, one for each image of ground_truth, found {len(predictions)}")
     if isinstance(names, Sized) and isinstance(ground_truth, Sized) and len(names) != len(ground_truth):
-        raise ValueError(f"{len(names)} names for {len(ground_truth)} images")
+        raise ValueError(f"names: expected {len(ground_truth)}, one for each image of ground_truth, found {len(names)}")
     evaluation = _native.Evaluation(kind, crop, cap, min_depth, allow_holes, gt_depth, scale, points, points_seed)
     columns = (predictions, ground_truth) if names is None else (predictions, ground_truth, names)
     for i, row in enumerate(zip_longest(*columns, fillvalue=_ENDED)):

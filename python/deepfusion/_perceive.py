@@ -109,7 +109,7 @@ def _plain(value: Any) -> Any:
     """NumPy's numbers and arrays as Python's own."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
-    raise TypeError(f"{value!r} is not a setting")
+    raise TypeError(f"a setting cannot contain {value!r}")
 
 
 class Perception:

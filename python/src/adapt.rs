@@ -43,16 +43,21 @@ struct AdaptRequest {
 impl AdaptRequest {
     fn settings(&self, compute: Compute) -> Result<AdaptSettings, Failure> {
         let camera = self.camera.parse().map_err(|_| Failure {
-            message: format!("camera: `{}`", self.camera),
-            hint: Some("give \"2\", \"3\" or \"both\"".into()),
+            message: format!(
+                "camera: expected \"2\", \"3\" or \"both\", found {:?}",
+                self.camera
+            ),
+            hint: None,
         })?;
         let own_camera = match self.simulated_camera.as_str() {
             "own" => true,
             "any" => false,
             other => {
                 return Err(Failure {
-                    message: format!("simulated_camera: `{other}`"),
-                    hint: Some("give \"own\" or \"any\"".into()),
+                    message: format!(
+                        "simulated_camera: expected \"own\" or \"any\", found {other:?}"
+                    ),
+                    hint: None,
                 });
             }
         };

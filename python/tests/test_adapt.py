@@ -54,6 +54,5 @@ def test_a_stopped_adaptation_continues_with_the_same_call(street, tmp_path):
 
 
 def test_the_simulated_camera_is_the_drives_own_or_any(street, tmp_path):
-    with pytest.raises(deepfusion.DeepFusionError, match="simulated_camera: `mine`") as refused:
+    with pytest.raises(deepfusion.DeepFusionError, match='simulated_camera: expected "own" or "any", found "mine"'):
         deepfusion.adapt(street, out=tmp_path / "mine", **{**QUICK, "simulated_camera": "mine"})
-    assert "own" in refused.value.hint

@@ -27,7 +27,7 @@ pub enum Error {
     },
     /// Too few pictures show the whole board.
     #[error(
-        "the whole board of {}x{} inner corners is in {found} of {}, at least {needed} are needed{}",
+        "the whole board of {}x{} inner corners is in {found} of {}, expected at least {needed}{}",
         board.columns, board.rows, count_of(*pictures, "picture"), instead(*seen)
     )]
     TooFewViews {
@@ -134,10 +134,10 @@ impl Hint for Error {
                 "film the whole board from more sides: sharp, tilted, near, and in every corner of the image".into()
             }
             Self::MixedSizes { .. } => {
-                "keep the pictures of one size, neither zoomed nor cropped: a calibration is for one image size".into()
+                "give pictures of one size, neither zoomed nor cropped: a calibration is for one image size".into()
             }
             Self::MixedOrientations { .. } => {
-                "keep the pictures with the camera held one way: upside down, its principal point lies elsewhere".into()
+                "give pictures taken with the camera held one way: turned, its principal point lies elsewhere".into()
             }
             Self::Corners { .. } => "give every corner of the board, row after row".into(),
             Self::Undetermined { .. } => {

@@ -51,7 +51,7 @@ pub enum CalibrationWarning {
     WideMargins(Vec<(&'static str, f64)>),
     /// The focal length has a large standard error.
     #[error(
-        "the standard error of the focal length is {:.1} %: add views from nearer and with more tilt",
+        "the standard error of the focal length is {:.1} %: add nearer and more tilted views",
         100.0 * share
     )]
     UnsureFocalLength {
@@ -152,7 +152,7 @@ mod tests {
             ),
             (
                 CalibrationWarning::UnsureFocalLength { share: 0.0123 },
-                "the standard error of the focal length is 1.2 %: add views from nearer and with more tilt",
+                "the standard error of the focal length is 1.2 %: add nearer and more tilted views",
             ),
             (
                 CalibrationWarning::LargeError { rms_px: 0.806 },

@@ -111,7 +111,7 @@ pub(crate) enum CliError {
         path: PathBuf,
     },
     /// Several drives where one is needed.
-    #[error("{}: contains {drives} drives, but a bag holds one", input.display())]
+    #[error("{}: contains {drives} drives, but a bag can have only one", input.display())]
     SeveralDrives {
         /// What was given.
         input: PathBuf,
@@ -208,7 +208,7 @@ pub(crate) enum CliError {
     },
     /// An adapted network that is worse than the one it started from.
     #[cfg(feature = "train")]
-    #[error("not kept: it is worse on the held-out frames: {worse}; moved to {}", path.display())]
+    #[error("not kept: worse on the held-out frames ({worse}); moved to {}", path.display())]
     Refused {
         /// The folder it was moved to.
         path: PathBuf,
@@ -223,7 +223,7 @@ pub(crate) enum CliError {
         path: PathBuf,
     },
     /// Work that was stopped and cannot be continued.
-    #[error("{what} was stopped before it was done")]
+    #[error("{what} was stopped before it was finished")]
     Ended {
         /// The work.
         what: &'static str,
@@ -284,10 +284,10 @@ impl Reportable for CliError {
             Self::DeviceDiffers { hint, .. } => Some(hint.clone()),
             #[cfg(not(feature = "rerun"))]
             Self::NoRerun => Some(
-                "build it with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser".into(),
+                "build deepfusion with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser".into(),
             ),
             Self::NoModelGiven => Some(
-                "train one (deepfusion train --data DRIVE), then give its folder: --model RUN".into(),
+                "train a network (deepfusion train --data DRIVE), then give its folder: --model RUN".into(),
             ),
             Self::BuiltWithoutTraining { .. } => Some(
                 "use a program built with the feature `train`, which is on by default".into(),
@@ -333,10 +333,10 @@ impl Reportable for CliError {
                  --learning-rate"
                     .into(),
             ),
-            Self::Ended { .. } => Some("start it again, into another folder".into()),
+            Self::Ended { .. } => Some("start again, with another folder".into()),
             Self::LiveAlone { .. } => Some("start one run for each source, each with its own folder".into()),
             Self::Terminal => Some("pipe a stream in (… | deepfusion … -), or give a camera or an address instead of -".into()),
-            Self::LiveShard => Some("leave --shard out".into()),
+            Self::LiveShard => Some("leave out --shard".into()),
             Self::OnlyLive { .. } => {
                 Some("leave it out, or give camera:0, an address such as rtsp://…, or - for standard input".into())
             }
@@ -347,10 +347,10 @@ impl Reportable for CliError {
             }
             Self::NotOnClock { .. } => Some("give seconds, a time of day or a date, as in the log".into()),
             Self::OutOfPlace { is_log: true, .. } => Some(
-                "leave it out; a log by itself takes --time, --speed, --unit and --dbc, and deepfusion data import makes a recording of it".into(),
+                "leave it out: a log by itself takes --time, --speed, --unit and --dbc, and deepfusion data import makes a recording of it".into(),
             ),
             Self::OutOfPlace { .. } => Some(
-                "leave it out; a recording's dataset.toml describes its log (time_column, speed_column, speed_unit, dbc)".into(),
+                "leave it out: a recording's dataset.toml describes its log (time_column, speed_column, speed_unit, dbc)".into(),
             ),
             Self::OtherLayout { layout, .. } => Some(format!("leave it out, or give --format {layout}")),
             Self::Varied { why, .. } => Some(

@@ -119,7 +119,7 @@ fn a_mean_of_runs_counts_as_trained_on_all_their_drives() {
     fails(
         at,
         "weights average a b --out mean",
-        &["mean: the folder is not empty"],
+        &["mean: the output folder is not empty"],
     );
     ok(
         at,

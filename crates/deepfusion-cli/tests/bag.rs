@@ -152,7 +152,7 @@ fn a_warning_of_opening_is_printed_once() {
     assert!(
         refused
             .stderr
-            .contains("validation frames are training frames"),
+            .contains("validation frames are also training frames"),
         "{}",
         refused.stderr
     );

@@ -62,7 +62,7 @@ fn a_camera_is_measured_and_its_file_undoes_the_lens() {
     let text = ok(at, &format!("{again} --overwrite")).stdout;
     for line in [
         "fx            33",
-        "9 used of 10",
+        "9 of 10 used",
         "wall.png (no board)",
         "camera.yaml",
     ] {
@@ -177,7 +177,7 @@ fn every_failure_is_an_error_with_a_hint() {
     fails(
         at,
         &format!("calibrate pictures {BOARD} --out c.yaml"),
-        &["4 of 4 pictures", "5 are needed"],
+        &["4 of 4 pictures", "expected at least 5"],
     );
     // The board's squares counted instead of its corners.
     fails(

@@ -67,7 +67,7 @@ fn runs_are_reported_kept_and_compared() {
         "Accuracy",
         "Points in space",
         "Best and worst frames",
-        "How it learned",
+        "Learning curves",
         "config.toml",
         "SHA-256",
     ] {
@@ -156,6 +156,6 @@ fn arrays_have_a_report_too() {
     let text = ok(at, args);
     assert!(text.contains("distance along z, m (no camera)"), "{text}");
     let html = page(&at.join("r.html"));
-    assert!(html.contains("Best and worst frames") && !html.contains("How it learned"));
+    assert!(html.contains("Best and worst frames") && !html.contains("Learning curves"));
     fails(at, &args.replace("r.html", "no/such/r.html"), &["no/such"]);
 }

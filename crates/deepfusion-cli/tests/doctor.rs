@@ -325,7 +325,7 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
         says(
             trace,
             "opening",
-            "a DBC file that describes its frames is needed",
+            "a CAN trace needs a DBC file that describes its frames",
             "--dbc FILE",
         );
     }

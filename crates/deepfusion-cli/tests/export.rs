@@ -80,7 +80,7 @@ fn an_exported_file_computes_what_the_network_does() {
         ("--model run --out depth.onnx", "depth.onnx"),
         ("--model run --out sim --overwrite", "sim"),
         ("--model sim --out new.onnx", "sim"),
-        ("--model run --out new.onnx --size 100x64", "100×64"),
+        ("--model run --out new.onnx --size 100x64", "100x64"),
         ("--model run --out new.onnx --check-with text.so", "text.so"),
         ("--model run --out new.onnx --check-with none.so", "none.so"),
         ("--model run --out no/folder/new.onnx", "no/folder"),

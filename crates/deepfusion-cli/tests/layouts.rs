@@ -111,7 +111,8 @@ fn files_that_are_not_read_are_reported_for_the_folder() {
     let about = printed.lines().filter(|line| line.contains("drive.mp4"));
     let about: Vec<&str> = about.collect();
     assert_eq!(about.len(), 1, "{printed}");
-    let expected = "sim is read only as KITTI raw; this in it looks like a recording and is not read: drive.mp4";
+    let expected =
+        "sim is read only as KITTI raw; drive.mp4 in it looks like a recording and is not read";
     assert!(about[0].contains(expected), "{printed}");
     assert!(!about[0].contains("_sync"), "{printed}");
 }

@@ -272,7 +272,7 @@ fn a_source_that_cannot_be_opened_is_an_error() {
         ),
         (
             "perceive --model run camera:0?sise=640x480 --out a".to_owned(),
-            "no setting `sise`",
+            "unknown setting `sise`",
         ),
     ];
     for (args, part) in &cases {

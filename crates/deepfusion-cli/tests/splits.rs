@@ -101,7 +101,7 @@ fn validation_frames_that_are_trained_on_are_refused() {
     let train = |rest: &str| format!("train --data sim {SMALL} {rest}");
     // Eleven pairs, the same in both.
     let shared = [
-        "validation frames are training frames",
+        "validation frames are also training frames",
         "11 of 2026_01_01_drive_0003_sync",
     ];
     fails(at, &train("--val-data sim --out a"), &shared);

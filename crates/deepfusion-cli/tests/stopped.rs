@@ -30,7 +30,7 @@ fn stop(folder: &Path, args: &str, out: &Path) {
     assert_eq!(output.status.code(), Some(130), "{args}: {text}");
     assert_eq!(output.stdout, b"", "{args}");
     for part in [
-        "stopping after the frames at work",
+        "stopping after the current frames",
         "nothing is written: stopped after",
         "hint: start it again",
     ] {

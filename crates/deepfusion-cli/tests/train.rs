@@ -397,7 +397,7 @@ fn options_replace_their_own_part_of_a_file() {
     let fits = deepfusion_weights::names().any(|name| name == "tiny");
     let is_printed = second
         .stderr
-        .contains("starting from random weights, as the configuration has no `init` (--init tiny");
+        .contains("starts from random weights, as the configuration has no `init` (--init tiny");
     assert_eq!(is_printed, fits, "{}", second.stderr);
     assert_eq!(data("second")["paths"][0], path("sim"));
     assert_eq!(data("second")["validation"][0], path("val"));
@@ -407,7 +407,7 @@ fn options_replace_their_own_part_of_a_file() {
         "train --config second/config.toml --data more --init none --out third",
     );
     assert!(
-        !third.stderr.contains("starts from nothing"),
+        !third.stderr.contains("no embedded network has"),
         "{}",
         third.stderr
     );

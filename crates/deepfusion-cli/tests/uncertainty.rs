@@ -30,7 +30,7 @@ fn train(at: &Path) {
         "train --config sure.toml --init plain/last.safetensors --steps 3 --out sure",
     );
     assert!(
-        begun.stderr.contains("new: the head for uncertainty"),
+        begun.stderr.contains("new: the uncertainty head"),
         "{}",
         begun.stderr
     );

@@ -76,7 +76,7 @@ fn a_build_without_rerun_says_how_to_get_it() {
     assert_eq!(
         run.stderr,
         "error: this build writes no files for the rerun viewer\n\
-         hint: build it with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser\n"
+         hint: build deepfusion with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser\n"
     );
     assert!(!folder.path().join("a.rrd").exists());
 }

@@ -66,7 +66,7 @@ fn errors_name_the_key() {
         error
             .unwrap_err()
             .to_string()
-            .contains("gone.csv does not exist")
+            .contains("gone.csv: no such file or folder")
     );
 }
 

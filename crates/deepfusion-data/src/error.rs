@@ -72,7 +72,7 @@ pub enum Error {
         such_as: PathBuf,
     },
     /// A required part of the recording is missing.
-    #[error("{}: not found; it should contain {part}", path.display())]
+    #[error("{}: no such file or folder; it should contain {part}", path.display())]
     Missing {
         /// Path at which the file or folder was expected.
         path: PathBuf,
@@ -369,7 +369,7 @@ pub enum Error {
         frame: u64,
     },
     /// A comma2k19 segment has other streams, but no video.
-    #[error("{}: not found; it should contain the segment's images", path.display())]
+    #[error("{}: no such file or folder; it should contain the segment's images", path.display())]
     NoSegmentVideo {
         /// Path at which the video was expected.
         path: PathBuf,

@@ -68,7 +68,11 @@ fn a_segment_without_its_video_is_inspected_but_not_opened() {
 
     let error = Dataset::open(root.path(), &OpenOptions::default()).unwrap_err();
     assert!(matches!(error, Error::NoSegmentVideo { .. }), "{error}");
-    assert!(error.to_string().contains("video.hevc: not found"));
+    assert!(
+        error
+            .to_string()
+            .contains("video.hevc: no such file or folder")
+    );
     assert!(error.hint().unwrap().contains("fetch video.hevc"));
 }
 

@@ -479,7 +479,7 @@ fn other_recordings_in_the_folder_are_named() {
     fs::create_dir(at.join("third")).unwrap();
     fs::write(at.join("third/clip.MP4"), "").unwrap();
     let expected = format!(
-        "{} is read only as image folder; these in it look like recordings and are not read: second, third (",
+        "{} is read only as an image folder; second, third in it look like recordings and are not read (",
         at.display()
     );
     assert!(warning(at).starts_with(&expected), "{}", warning(at));
@@ -506,11 +506,11 @@ fn other_recordings_in_the_folder_are_named() {
     };
     fs::write(root.path().join("drive.mp4"), "").unwrap();
     let one = expected(
-        "this in it looks like a recording and is not read: drive.mp4 (give it by its own path)",
+        "drive.mp4 in it looks like a recording and is not read (give it by its own path)",
     );
     assert_eq!(warning(root.path()), one);
     write_drive(&root.path().join("walk"), 4, 10.0, 0.0);
-    let both = expected("these in it look like recordings and are not read: drive.mp4, walk (");
+    let both = expected("drive.mp4, walk in it look like recordings and are not read (");
     assert!(warning(root.path()).starts_with(&both));
     assert_eq!(warning(&drive), "");
 }

@@ -134,8 +134,8 @@ impl NoCameraAhead {
                 correlation,
                 ..
             } => format!(
-                "the pictures match the vehicle's motion best at an offset of {ahead_s:+.2} s, with a correlation of {correlation:.2}; at least {LEAST_CORRELATION} is \
-                 needed"
+                "the pictures match the vehicle's motion best at an offset of {ahead_s:+.2} s, with a correlation of {correlation:.2}, \
+                 expected at least {LEAST_CORRELATION}"
             ),
             Self::Unsure {
                 ahead_s,
@@ -143,7 +143,7 @@ impl NoCameraAhead {
                 most_s,
                 ..
             } => format!(
-                "the clocks are {ahead_s:+.2} ± {std_error_s:.3} s apart; a standard error of at most {most_s} s is needed"
+                "the clocks are {ahead_s:+.2} ± {std_error_s:.3} s apart, expected a standard error of at most {most_s} s"
             ),
             Self::Differ {
                 ahead_s,

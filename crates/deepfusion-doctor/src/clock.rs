@@ -27,7 +27,7 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     // An offset that cannot be distinguished from 0 passes.
     let limit = least_s.max(SIGMAS * error);
     let figure = Figure::new(
-        "offset, vehicle less camera",
+        "offset, vehicle minus camera",
         value,
         "s",
         Limit::Within(-limit, limit),

@@ -78,8 +78,13 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     let k = &survey.dataset.intrinsics(0);
     let mut outcome = Outcome::new("heading");
     let axes = [
-        ("pitch of the way ahead", 0, k.fy, HeadingAngle::Pitch),
-        ("yaw of the way ahead", 1, k.fx, HeadingAngle::Yaw),
+        (
+            "pitch of the direction of travel",
+            0,
+            k.fy,
+            HeadingAngle::Pitch,
+        ),
+        ("yaw of the direction of travel", 1, k.fx, HeadingAngle::Yaw),
     ];
     let mut unsure = Vec::new();
     for (quantity, axis, focal, angle) in axes {

@@ -37,25 +37,25 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let sides = [
         (
             ImageSide::Bottom,
-            "still rim at the bottom",
+            "static rim at the bottom",
             down,
             still.rim(width, height, |along, deep| (along, height - 1 - deep)),
         ),
         (
             ImageSide::Top,
-            "still rim at the top",
+            "static rim at the top",
             down,
             still.rim(width, height, |along, deep| (along, deep)),
         ),
         (
             ImageSide::Left,
-            "still rim at the left",
+            "static rim at the left",
             across,
             still.rim(height, width, |along, deep| (deep, along)),
         ),
         (
             ImageSide::Right,
-            "still rim at the right",
+            "static rim at the right",
             across,
             still.rim(height, width, |along, deep| (width - 1 - deep, along)),
         ),

@@ -48,7 +48,7 @@ pub(super) fn check(k: &Intrinsics) -> Outcome {
     let view = 2.0 * (0.5 * width / k.fx).atan().to_degrees();
     outcome.judge(
         Severity::Error,
-        Figure::new("width of view", view, "degrees", VIEW_DEG),
+        Figure::new("field of view", view, "degrees", VIEW_DEG),
         || CameraReason::View {
             fx: k.fx,
             view_deg: view,

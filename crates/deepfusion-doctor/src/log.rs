@@ -162,7 +162,7 @@ fn uncertainty(log: &DriveLog) -> Outcome {
     let mut outcome = Outcome::new("log-sure");
     let share = median(shares);
     let figure = Figure::new(
-        "standard deviation of a speed, of the speed",
+        "standard deviation of a speed, relative to it",
         share,
         "%",
         Limit::AtMost(MOST_SIGMA),

@@ -101,7 +101,7 @@ mod tests {
             "sort the frames by time, or correct the time stamps",
             "swap the folders image_02 and image_03",
             "compare the time stamps and the yaw rate's unit (rad/s) and axis (z up)",
-            "expose longer, or leave the darkest drives out",
+            "use a longer exposure, or leave out the darkest drives",
             "give the log's time zone; pictures and speeds show what remains of the clocks' offset",
             "correct what the message names",
         ];

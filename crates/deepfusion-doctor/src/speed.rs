@@ -100,7 +100,12 @@ fn by_poses(dataset: &Dataset, outcome: &mut Outcome) {
         return;
     }
     let ratio = by_poses / by_speeds;
-    let figure = Figure::new("way by the poses over way by the speeds", ratio, "", RATIO);
+    let figure = Figure::new(
+        "distance by the poses over distance by the speeds",
+        ratio,
+        "",
+        RATIO,
+    );
     outcome.judge(Severity::Error, figure, || MotionReason::Poses {
         by_poses_m: by_poses,
         by_speeds_m: by_speeds,

@@ -37,7 +37,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     }
     let mut outcome = Outcome::new(CHECK);
     let figure = Figure::new(
-        "turns by the gyro over turns by the steering",
+        "turns by the gyroscope over turns by the steering",
         factor,
         "",
         FACTOR,

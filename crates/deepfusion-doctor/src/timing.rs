@@ -88,7 +88,7 @@ fn unknown_motion(dataset: &Dataset, outcome: &mut Outcome) {
     let is_beside = stretches == usize::from(before_s > 0.0) + usize::from(after_s > 0.0);
     let share = 100.0 * unknown_s / all;
     let figure = Figure::new(
-        "time without a motion",
+        "time without a known motion",
         share,
         "%",
         Limit::AtMost(MOST_UNKNOWN),

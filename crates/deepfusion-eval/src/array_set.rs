@@ -3,6 +3,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use deepfusion_fs::FileError;
 use deepfusion_geometry::{NpyHeader, NpyHeaderProblem};
 use ndarray::{ArrayD, Axis};
 use ndarray_npy::{ReadNpyError, ReadNpyExt};
@@ -47,12 +48,9 @@ impl ArraySet {
     /// Opens a file. Its type is recognised by its content, not its name.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be read, [`Error::ArrayFile`] if it is neither kind of file.
+    /// [`Error::File`] if it cannot be read, [`Error::ArrayFile`] if it is neither kind of file.
     pub fn open(path: &Path) -> Result<Self> {
-        let io = |source| Error::Io {
-            path: path.to_owned(),
-            source,
-        };
+        let io = |source| FileError::new(path, source);
         let mut file = BufReader::new(File::open(path).map_err(io)?);
         let mut magic = Vec::new();
         file.by_ref().take(6).read_to_end(&mut magic).map_err(io)?;

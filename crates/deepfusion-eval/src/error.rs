@@ -1,4 +1,5 @@
-use deepfusion_hint::{Hint, count_of, system_hint};
+use deepfusion_fs::FileError;
+use deepfusion_hint::{Hint, count_of};
 use std::path::PathBuf;
 
 mod arrays;
@@ -40,7 +41,7 @@ pub enum Error {
         total: usize,
     },
     /// The number of values is not width × height, or is zero.
-    #[error("`{name}` is {width}×{height} but has {}", count_of(*len, "value"))]
+    #[error("`{name}` is {width}x{height} but has {}", count_of(*len, "value"))]
     Shape {
         /// Name of the array.
         name: String,
@@ -52,7 +53,7 @@ pub enum Error {
         len: usize,
     },
     /// A protocol that cannot measure anything.
-    #[error("{field} is {value}: expected {expected}")]
+    #[error("{field} is {value}, expected {expected}")]
     Protocol {
         /// The field of [`crate::Protocol`].
         field: &'static str,
@@ -76,13 +77,8 @@ pub enum Error {
         reason: IntervalsProblem,
     },
     /// A file that cannot be opened or read.
-    #[error("cannot read {path}")]
-    Io {
-        /// Path of the file.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// An array file with unexpected content.
     #[error("{path}: {reason}")]
     ArrayFile {
@@ -93,7 +89,7 @@ pub enum Error {
         reason: ArrayProblem,
     },
     /// Ground truth without a prediction, or the other way round.
-    #[error("{path} has no array for {count} of {of}: {names}")]
+    #[error("{path}: no array for {count} of {of}: {names}")]
     UnmatchedNames {
         /// The file that lacks arrays.
         path: PathBuf,
@@ -167,7 +163,7 @@ impl Hint for Error {
             Self::Intervals { .. } => {
                 Some("calibrate the network's uncertainty again".into())
             }
-            Self::Io { source, .. } => Some(system_hint(source.kind()).into()),
+            Self::File(error) => error.hint(),
             Self::ArrayFile { reason, .. } => reason.hint().map(str::to_owned),
             Self::UnmatchedNames { instead, .. } => Some(match instead {
                 Some(name) => format!(

@@ -31,6 +31,8 @@ mod statistics;
 mod table;
 pub mod verdict;
 
+pub use deepfusion_fs::FileError;
+
 pub use array_set::{ArraySet, match_names};
 pub use error::{
     ArrayName, ArrayProblem, Error, ExpectedProtocolSetting, ExpectedShape, IntervalsProblem,

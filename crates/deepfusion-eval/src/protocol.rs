@@ -211,15 +211,15 @@ mod tests {
         for (protocol, text) in [
             (
                 with(0.0, 80.0, Scaling::None),
-                "the minimum depth is 0: expected metres above 0",
+                "the minimum depth is 0, expected metres above 0",
             ),
             (
                 with(0.5, 0.25, Scaling::None),
-                "the cap is 0.25: expected metres above the minimum depth",
+                "the cap is 0.25, expected metres above the minimum depth",
             ),
             (
                 with(0.5, 80.0, Scaling::Fixed(-1.0)),
-                "the fixed scale is -1: expected a factor above 0",
+                "the fixed scale is -1, expected a factor above 0",
             ),
         ] {
             assert_eq!(protocol.validate().unwrap_err().to_string(), text);

@@ -91,7 +91,7 @@ fn missing_and_extra_names_are_errors() {
     let error = match_names(&open("few.npz"), &open("gt.npz")).unwrap_err();
     let text = error.to_string();
     assert!(
-        text.contains("few.npz has no array for 2 of the 3")
+        text.contains("few.npz: no array for 2 of the 3")
             && text.contains("0000000016, 0000000032"),
         "{text}"
     );

@@ -15,6 +15,7 @@ use std::io::ErrorKind;
 #[must_use]
 pub fn system_hint(kind: ErrorKind) -> &'static str {
     match kind {
+        ErrorKind::AlreadyExists => "choose another path, or remove it first",
         ErrorKind::NotFound => "check the spelling, and that the disk is mounted",
         ErrorKind::PermissionDenied => {
             "check the permissions of the file and its folder, or choose another place"
@@ -34,6 +35,7 @@ mod tests {
     #[test]
     fn known_kinds_of_errors_have_their_own_hints() {
         for (kind, expected) in [
+            (ErrorKind::AlreadyExists, "remove it first"),
             (ErrorKind::NotFound, "spelling"),
             (ErrorKind::PermissionDenied, "permissions"),
             (ErrorKind::ReadOnlyFilesystem, "written to"),

@@ -41,7 +41,7 @@ pub enum ImageProblem {
     #[error("cannot be decoded: {0}")]
     Undecodable(#[source] ImageError),
     /// The image is not a depth image of KITTI's format.
-    #[error("not a 16-bit grey PNG, as needed for depth in steps of 1/256 m")]
+    #[error("not a depth image: expected a 16-bit grey PNG, in steps of 1/256 m")]
     NotAnnotatedDepth,
 }
 
@@ -53,6 +53,7 @@ impl ImageProblem {
             Self::Truncated => {
                 "copy the file again, or, to leave the frame out, delete it with its line in frames.csv or timestamps.txt"
             }
+            Self::NotAnnotatedDepth => "give depth as a 16-bit grey PNG, in steps of 1/256 m",
             _ => "give a PNG or JPEG image",
         }
     }
@@ -86,5 +87,12 @@ mod tests {
         let message = error.to_string();
         assert!(message.contains("no/such/folder/a.png"), "{message}");
         assert!(error.hint().is_some());
+    }
+
+    /// A PNG or JPEG in colour would be refused again.
+    #[test]
+    fn the_hint_for_depth_asks_for_16_bits() {
+        let hint = ImageProblem::NotAnnotatedDepth.hint();
+        assert!(hint.contains("16-bit grey PNG"), "{hint}");
     }
 }

@@ -53,7 +53,7 @@ impl Hint for Error {
             Self::Runtime { source, .. } => source.hint(),
             Self::Shape { reason, .. } => reason.hint(),
             Self::Class { known, .. } if known.is_empty() => {
-                Some("the model has no class names: select no classes, and all are used".into())
+                Some("select no classes to use all of them: the model has no class names".into())
             }
             Self::Class { known, .. } => Some(format!("choose among {}", known.join(", "))),
         }

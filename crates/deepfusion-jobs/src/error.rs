@@ -78,7 +78,7 @@ pub enum Error {
     },
     /// Ground truth without names whose number of arrays is not the number of frames.
     #[error(
-        "{} of ground truth without names for {}",
+        "{} of ground truth without names, but {}",
         count_of(*found, "array"),
         count_of(*expected, "frame")
     )]
@@ -204,7 +204,7 @@ pub enum Error {
         why: NoMean,
     },
     /// A folder for a new output that is not empty.
-    #[error("{}: the folder is not empty", path.display())]
+    #[error("{}: the output folder is not empty", path.display())]
     Occupied {
         /// Path of the folder.
         path: PathBuf,
@@ -399,9 +399,7 @@ pub enum Error {
     },
     /// Recordings, or settings for opening them, that were given in addition to a configuration's data sets.
     #[cfg(feature = "train")]
-    #[error(
-        "setting `{setting}`: expected none beside data.sets: each set has its own, found both"
-    )]
+    #[error("setting `{setting}`: not allowed beside data.sets, where each set has its own")]
     BesideSets {
         /// The setting.
         setting: Setting,

@@ -44,7 +44,7 @@ impl RunHistory {
     pub fn add_to(&self, mut page: HtmlReport) -> HtmlReport {
         if let Some(log) = &self.log {
             page = page
-                .section("How it learned")
+                .section("Learning curves")
                 .note(&format!(
                     "{}; training curves are means over intervals of steps; held-out curves are on samples never trained on.",
                     count_of(log.steps(), "step")

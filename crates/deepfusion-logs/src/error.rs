@@ -1,5 +1,6 @@
 use crate::problem::{BytesProblem, LineField, LineProblem, SignalProblem, SpeedProblem};
-use deepfusion_hint::{Hint, system_hint};
+use deepfusion_fs::FileError;
+use deepfusion_hint::Hint;
 use std::path::{Path, PathBuf};
 
 /// Why a log cannot be read or used.
@@ -7,15 +8,10 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum Error {
     /// A file could not be opened or read.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// Path of the file.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A line cannot be read.
-    #[error("{}:{line}: {field}: {problem}", path.display())]
+    #[error("{}:{line}: {}{problem}", path.display(), place(field))]
     Line {
         /// Path of the file.
         path: PathBuf,
@@ -65,7 +61,7 @@ pub enum Error {
         why: NoGps,
     },
     /// A CAN trace without a signal to decode.
-    #[error("{}: a CAN trace, and {problem}", path.display())]
+    #[error("{}: {problem}", path.display())]
     Signal {
         /// Path of the trace.
         path: PathBuf,
@@ -95,6 +91,14 @@ pub enum Error {
     /// A DBC file or one of its signals cannot be used.
     #[error(transparent)]
     Motion(#[from] deepfusion_motion::Error),
+}
+
+/// The part of a line, before a problem; nothing for the whole line.
+fn place(field: &LineField) -> String {
+    match field {
+        LineField::Line => String::new(),
+        field => format!("{field}: "),
+    }
 }
 
 /// Why a camera's own track has no speed.
@@ -133,13 +137,13 @@ pub enum ColumnProblem {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
+            Self::File(error) => return error.hint(),
             Self::Motion(error) => return error.hint(),
             Self::Line { .. } => "correct the line or delete it, or export the log again",
             Self::Bytes { .. } => "copy the file again from where it was recorded",
             Self::Column { problem, .. } => return problem.hint(),
             Self::NoSpeed { .. } | Self::NoGps { .. } => {
-                "GPX, NMEA, tables with a header, phones' export folders, GoPro's videos and CAN traces are read"
+                "give a GPX or NMEA track, a table with a header, a phone's export folder, a GoPro's video or a CAN trace"
             }
             Self::Signal { .. } => "give the DBC file and the speed's signal, as Message.Signal",
             Self::NoStart { .. } => "give the time of the first frame on the log's clock",
@@ -188,10 +192,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
     pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            source,
-        }
+        FileError::new(path, source).into()
     }
 }
 

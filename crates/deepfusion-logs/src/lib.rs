@@ -42,6 +42,8 @@ mod turns;
 mod units;
 mod wide_table;
 
+pub use deepfusion_fs::FileError;
+
 pub use dates::{parse_date, time_on_clock};
 pub use drive_folder::{Camera, DriveFolder, Media};
 pub use error::{ColumnProblem, Error, NoGps, Result};

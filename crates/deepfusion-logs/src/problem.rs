@@ -19,7 +19,9 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LineField {
-    /// A part named by the format: an element, a sentence, or `any` for the whole line.
+    /// The whole line.
+    Line,
+    /// A part named by the format: an element or a sentence.
     Named(&'static str),
     /// A column of a table, by its header.
     Column(String),
@@ -30,6 +32,7 @@ pub enum LineField {
 impl fmt::Display for LineField {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Line => f.write_str("line"),
             Self::Named(name) => f.write_str(name),
             Self::Column(header) => write!(f, "column {header}"),
             Self::FixColumn(name) => write!(f, "Fix, {name}"),
@@ -82,18 +85,18 @@ pub enum BytesProblem {
     Blf(#[from] BlfProblem),
 }
 
-/// Why a log holds no speed.
+/// Why a log has no speed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpeedProblem {
     /// Fewer than two rows have a time and a speed.
-    #[error("{} with a time and a speed, at least two are needed", count_of(*rows, "row"))]
+    #[error("{} with a time and a speed, expected at least two", count_of(*rows, "row"))]
     TooFewRows {
         /// Number of rows that have both.
         rows: usize,
     },
     /// Fewer than two fixes lie near each other in time.
-    #[error("{} with a time, at least two in ten seconds are needed", count_of(*fixes, "fix"))]
+    #[error("{} with a time, expected at least two within 10 s", count_of(*fixes, "fix"))]
     TooFewFixes {
         /// Number of fixes.
         fixes: usize,

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::log::Speed;
 use crate::note::{LogNote, TableNote};
-use crate::problem::{LineProblem, SpeedProblem};
+use crate::problem::{LineField, LineProblem, SpeedProblem};
 use std::path::Path;
 
 /// A file's text: UTF-8, with a byte order mark or without.
@@ -18,7 +18,7 @@ pub(crate) fn text_of(path: &Path) -> Result<String> {
         Error::Line {
             path: path.to_owned(),
             line,
-            field: "any".into(),
+            field: LineField::Line,
             problem: if utf16 {
                 LineProblem::Utf16
             } else {
@@ -144,7 +144,7 @@ mod tests {
         let kept = astray.leave_out(rows, |(), back_ns| Error::Line {
             path: "trip.csv".into(),
             line: 1,
-            field: "any".into(),
+            field: LineField::Line,
             problem: TableProblem::Backwards {
                 text: "x".into(),
                 back_s: back_ns as f64,

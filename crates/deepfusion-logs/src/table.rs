@@ -41,7 +41,7 @@ impl Table {
             .from_reader(text.as_bytes());
         let refused = |error: csv::Error| {
             let line = error.position().map_or(1, csv::Position::line) + first_line - 1;
-            BadLine::new(line, "any", TableProblem::from(error)).of(path)
+            BadLine::new(line, LineField::Line, TableProblem::from(error)).of(path)
         };
         let header = reader.headers().map_err(refused)?.clone();
         let named = (0..header.len())
@@ -72,7 +72,7 @@ impl Table {
             if words.len() < named || surplus {
                 let values = words.len();
                 let problem = TableProblem::Values { values, named };
-                return Err(BadLine::new(line, "any", problem).of(path));
+                return Err(BadLine::new(line, LineField::Line, problem).of(path));
             }
             table.rows.push(Row {
                 line,

@@ -19,6 +19,12 @@ fn plain(name: &str) -> DriveLog {
     read(&fixture(name), &ReadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
+#[test]
+fn a_missing_log_is_named() {
+    let error = read(Path::new("nowhere.csv"), &ReadOptions::default()).unwrap_err();
+    assert_eq!(error.to_string(), "nowhere.csv: no such file or folder");
+}
+
 fn true_speed(t: f64) -> f64 {
     8.0 + 3.0 * (0.4 * t).sin()
 }
@@ -314,7 +320,7 @@ fn can_traces_of_both_kinds_are_the_same() {
         .unwrap_err()
         .to_string();
     assert!(
-        error.contains("a DBC file that describes its frames is needed"),
+        error.contains("a CAN trace needs a DBC file that describes its frames"),
         "{error}"
     );
 }
@@ -422,7 +428,7 @@ fn damaged_logs_are_named_by_line_and_column() {
             "torque.csv",
             ",30.946,1800",
             "",
-            "torque.csv:3: any: 7 values, the header has 9",
+            "torque.csv:3: 7 values, the header has 9",
         ),
         (
             "torque.csv",

@@ -166,7 +166,7 @@ impl Hint for Error {
             Self::Config { field: "view_motion", .. } => Some(
                 "set view_motion = \"posenet\", or keep the speed loss: without it, a run uses no measured motion".into(),
             ),
-            Self::Config { field, .. } => Some(format!("change `{field}` in the configuration")),
+            Self::Config { field, .. } => Some(format!("correct `{field}` in the configuration")),
             Self::Setting { .. } | Self::PresetAsKey { .. } => Some(
                 concat!(
                     "see all keys in ",
@@ -277,7 +277,7 @@ pub enum SettingProblem {
         key: String,
     },
     /// A key that does not exist.
-    #[error("there is no key `{key}`{}", did_you_mean(nearest))]
+    #[error("unknown key `{key}`{}", did_you_mean(nearest))]
     NoSuchKey {
         /// The key.
         key: String,

@@ -17,7 +17,7 @@ const NAMES_SHOWN: usize = 12;
 #[non_exhaustive]
 pub enum Error {
     /// A setting with an implausible value.
-    #[error("{field} is {value}: expected {expected}")]
+    #[error("{field} is {value}, expected {expected}")]
     Config {
         /// Name of the setting.
         field: &'static str,
@@ -151,7 +151,7 @@ impl Hint for Error {
                 "multiply the accelerations by 9.80665: they look like multiples of g"
             }
             Self::NotGravity { norm, .. } if *norm < 0.8 => {
-                "give the raw accelerations, or leave the unit out: gravity seems to have been removed already"
+                "give the raw accelerations, or leave out the unit: gravity seems to have been removed already"
             }
             Self::NotGravity { .. } => "give accelerations in m/s², gravity included",
             Self::NotUp { angle_deg, .. } if *angle_deg > 135.0 => {

@@ -32,7 +32,7 @@ pub enum Error {
     #[error(transparent)]
     Network(#[from] deepfusion_infer::Error),
     /// The file is too large for the format.
-    #[error("the model has {bytes} bytes; an ONNX file holds at most {most}")]
+    #[error("the model has {bytes} bytes, expected at most {most} in an ONNX file")]
     TooLarge {
         /// Size of the file that would be needed, bytes.
         bytes: usize,

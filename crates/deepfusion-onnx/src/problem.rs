@@ -49,7 +49,7 @@ pub enum NodeProblem {
         name: String,
     },
     /// The constant's type is wrong, or its values do not match its dimensions.
-    #[error("`{name}` does not hold the f32 values that its dimensions require")]
+    #[error("`{name}` does not have the f32 values that its dimensions require")]
     Values {
         /// Name of the constant.
         name: String,

@@ -116,7 +116,7 @@ pub(crate) fn encode(model: &DepthModel) -> Result<ModelProto, Error> {
         producer_name: "deepfusion".into(),
         producer_version: version.into(),
         doc_string: if model.canonical {
-            "Metric depth from one RGB picture, shown whole. For every camera multiply depth by its f_y, in pixels of the \
+            "Metric depth from one RGB picture, resized but not cropped. For every camera, multiply depth by its f_y, in pixels of the \
              resized picture, over the metadata's canonical_fy_px."
         } else {
             "Metric depth from one RGB picture. For a camera other than the one trained with, multiply depth \

@@ -5,7 +5,7 @@ use deepfusion_hint::{Hint, count_of, system_hint};
 #[non_exhaustive]
 pub enum Error {
     /// Two things that belong together differ in size.
-    #[error("{what} has {}, expected {}×{}", count_of(*found, "value"), expected.0, expected.1)]
+    #[error("{what} has {}, expected {}x{}", count_of(*found, "value"), expected.0, expected.1)]
     Size {
         /// The part whose size is wrong.
         what: &'static str,

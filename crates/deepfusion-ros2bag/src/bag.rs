@@ -259,6 +259,6 @@ pub enum FileDamage {
     #[error(transparent)]
     Unreadable(SourceDamage),
     /// `metadata.yaml` names the file, but it does not exist.
-    #[error("{} does not exist", .0.display())]
+    #[error("{}: no such file or folder", .0.display())]
     NotThere(PathBuf),
 }

@@ -90,11 +90,11 @@ impl Hint for StorageProblem {
             Self::NotMcap => "give the recording's own .mcap file",
             Self::Metadata(_) => "write it again with `ros2 bag reindex FOLDER`",
             Self::Chunk { .. } => COPY_AGAIN,
-            Self::PackedMessage { .. } => "the message is damaged",
+            Self::PackedMessage { .. } => "copy the file again: the message is damaged",
             #[cfg(feature = "ros2-sqlite")]
             Self::Sqlite(e) => sqlite::hint(e),
             #[cfg(feature = "ros2-sqlite")]
-            Self::Message { .. } => "the message is damaged",
+            Self::Message { .. } => "copy the file again: the message is damaged",
         };
         Some(text.to_owned())
     }

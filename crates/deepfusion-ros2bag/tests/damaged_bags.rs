@@ -199,7 +199,10 @@ fn unsupported_files_have_a_hint() {
     };
     assert_eq!(files, &[FileDamage::NotThere(bag.join("bag_1.db3"))]);
     let message = damage.to_string();
-    assert!(message.ends_with("bag_1.db3 does not exist"), "{message}");
+    assert!(
+        message.ends_with("bag_1.db3: no such file or folder"),
+        "{message}"
+    );
     std::fs::write(
         bag.join("metadata.yaml"),
         "rosbag2_bagfile_information: 3\n",

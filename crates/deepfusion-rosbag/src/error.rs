@@ -12,7 +12,7 @@ pub enum Error {
     #[error(transparent)]
     File(#[from] FileError),
     /// The file is not a bag.
-    #[error("{}: not a ROS bag: expected `#ROSBAG V2.0`, it begins with {found}", path.display())]
+    #[error("{}: not a ROS bag: it begins with {found}, expected `#ROSBAG V2.0`", path.display())]
     NotABag {
         /// Path of the file.
         path: PathBuf,
@@ -68,7 +68,7 @@ pub enum Error {
         topics: Vec<String>,
     },
     /// A message was decoded as another type than its connection's.
-    #[error("{}: {topic} holds {found}, expected {expected}", path.display())]
+    #[error("{}: {topic} has messages of type {found}, expected {expected}", path.display())]
     WrongType {
         /// Path of the bag.
         path: PathBuf,

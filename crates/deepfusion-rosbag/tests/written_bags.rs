@@ -163,7 +163,7 @@ fn a_message_larger_than_a_chunk_is_a_chunk() {
         assert!(
             wrong
                 .to_string()
-                .contains("/blob holds a/Blob, expected sensor_msgs/Imu"),
+                .contains("/blob has messages of type a/Blob, expected sensor_msgs/Imu"),
             "{wrong}"
         );
     }

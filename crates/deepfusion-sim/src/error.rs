@@ -87,7 +87,7 @@ impl Hint for Error {
             } => Some(format!("set `{field}` to {expected}")),
             Self::Varied { why, .. } => Some(why.hint()),
             Self::OutputNotEmpty { .. } => {
-                Some("choose a new folder, or empty this one first".to_owned())
+                Some("choose another folder, or empty this one first".to_owned())
             }
             Self::Unfinished(error) => error.hint(),
             Self::Io { source, .. } => Some(

@@ -314,7 +314,7 @@ fn blurred_frames_are_counted() {
     let finding = found(&diagnosis, "blur", "blurred frames");
     assert!((value(finding) - 12.5).abs() < 3.0, "{finding:?}");
     assert!(finding.what.to_string().contains("frame 3"), "{finding:?}");
-    assert!(finding.hint.contains("expose shorter"), "{finding:?}");
+    assert!(finding.hint.contains("shorter exposure"), "{finding:?}");
 }
 
 #[test]
@@ -553,7 +553,7 @@ fn a_gap_in_the_speed_is_reported_with_its_frame() {
     let drive = Drive::clean();
     drive.remove_oxts(40..56);
     let diagnosis = drive.diagnose();
-    let finding = found(&diagnosis, "timing", "time without a motion");
+    let finding = found(&diagnosis, "timing", "time without a known motion");
     // From the last packet before the gap to the first after it, without the time at both ends for which a track is extrapolated.
     assert!((14.0..18.0).contains(&value(finding)), "{finding:?}");
     assert!(
@@ -573,7 +573,7 @@ fn a_log_that_ends_early_is_distinguished_from_one_with_gaps() {
     let images = drive.open().frames().len();
     drive.remove_oxts(images - 8..images);
     let diagnosis = drive.diagnose();
-    let finding = found(&diagnosis, "timing", "time without a motion");
+    let finding = found(&diagnosis, "timing", "time without a known motion");
     let message = finding.what.to_string();
     assert!(message.contains("before the last image"), "{message}");
     assert!(!message.contains("after the first"), "{message}");

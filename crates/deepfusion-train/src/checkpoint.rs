@@ -173,7 +173,7 @@ impl Checkpoints for RunFolder {
             new_pose_net.then_some("PoseNet"),
             new_masks.then_some("the explainability masks"),
             new_decoder.then_some("the flow decoder"),
-            new_head.then_some("the head for uncertainty"),
+            new_head.then_some("the uncertainty head"),
         ];
         Ok((model, new.into_iter().flatten().collect()))
     }

@@ -62,7 +62,10 @@ pub enum Error {
         images: Vec<String>,
     },
     /// Validation frames are also training frames: their loss would measure memorisation.
-    #[error("validation frames are training frames: {}", frames_by_drive(shared))]
+    #[error(
+        "validation frames are also training frames: {}",
+        frames_by_drive(shared)
+    )]
     SharedFrames {
         /// The drives with such frames.
         shared: Vec<SharedFrames>,
@@ -191,7 +194,7 @@ impl Hint for Error {
                     .into(),
             ),
             Self::CameraKnown { .. } => Some(
-                "train without assumed_camera.learn, or leave this recording out; a known camera is better than a learned one"
+                "train without assumed_camera.learn, or leave out this recording; a known camera is better than a learned one"
                     .into(),
             ),
             Self::SeveralCameras { .. } => {

@@ -171,12 +171,12 @@ pub(crate) fn keep<E: From<Error>>(
     // A folder that cannot be replaced in the end is an error now, not after hours of decoding.
     let in_the_way = match Origin::read(cache) {
         Some(before) if before.is_of_another_file(origin) => {
-            Some("the folder has the frames of another file: delete it")
+            Some("the folder has the frames of another file")
         }
         Some(_) => None,
         None => std::fs::read_dir(cache)
             .is_ok_and(|mut files| files.next().is_some())
-            .then_some("the folder has other files, or only some of the frames: delete it"),
+            .then_some("the folder has other files, or only some of the frames"),
     };
     if let Some(why) = in_the_way {
         let why = std::io::Error::new(std::io::ErrorKind::AlreadyExists, why);

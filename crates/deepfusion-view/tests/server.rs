@@ -220,7 +220,7 @@ fn broken_files_are_reported_and_the_rest_is_shown() {
         ("000003", "gone/street.mp4: the picture no longer exists"),
         ("000004", "depth is 96x48, the sidecar says 640x192"),
         ("000004", "the picture is 96x48, the sidecar says 640x192"),
-        ("000005", "the sidecar's camera is impossible: fx is 0"),
+        ("000005", "the sidecar's camera is invalid: fx is 0"),
         ("000006", ""),
         ("coming", "incomplete or truncated"),
     ] {

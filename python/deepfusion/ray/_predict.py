@@ -336,7 +336,7 @@ def predict(
     if gpus_per_worker and ":" in device:
         raise ValueError(f"device: expected no number, since each worker sees only the GPU it is given, found {device}")
     if precision != "f32" and (gpus_per_worker or device not in ("cpu", "auto")):
-        raise ValueError(f"precision: a GPU computes in f32, found {precision}")
+        raise ValueError(f'precision: expected "f32" on a GPU, found {precision!r}')
     if precision not in ("f32", "bf16", "int8"):
         raise ValueError(f'precision: expected "f32", "bf16" or "int8", found {precision!r}')
     options = dict(storage_options or {})

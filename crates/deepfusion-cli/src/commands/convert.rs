@@ -53,7 +53,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
             dataset.load_image(0)?;
         }
     }
-    interrupt::catch("stopping after the frames at work");
+    interrupt::catch("stopping after the current frames");
     let mut progress = Progress::new("converting");
     let mut report = |done, total| {
         progress.set(done, total);

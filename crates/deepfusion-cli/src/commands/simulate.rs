@@ -35,7 +35,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<()> {
     if let Some(warning) = fewer_cars(config.moving_cars, simulation.moving_cars()) {
         tracing::warn!("{warning}");
     }
-    interrupt::catch("stopping after the frames at work");
+    interrupt::catch("stopping after the current frames");
     let mut progress = Progress::new("simulating");
     let mut report = |done, total| {
         progress.set(done, total);

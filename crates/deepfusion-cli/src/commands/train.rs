@@ -63,7 +63,7 @@ fn new_run(args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
     {
         let name = &network.card.name;
         say(&format!(
-            "starting from random weights, as the configuration has no `init` (--init {name} starts from the embedded network)"
+            "starts from random weights, as the configuration has no `init` (--init {name} starts from the embedded network)"
         ));
     }
     start.record_in(&mut config)?;
@@ -132,7 +132,7 @@ fn unused_turns(trainer: &Trainer, args: &TrainArgs) -> Option<String> {
 /// take.
 pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSummary> {
     allocator::keep_memory();
-    interrupt::catch("stopping after this step; the run is saved");
+    interrupt::catch("stopping after the current step; the run is saved");
     let mut recorder = Recorder::open(trainer.folder(), trainer.step(), pace)?;
     let summary = trainer.run(&mut |event| recorder.handle(event))?;
     recorder.finish()?;

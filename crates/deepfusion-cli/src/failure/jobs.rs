@@ -117,9 +117,9 @@ impl Reportable for Error {
             Self::NothingToPack { .. } => {
                 Some("train from it first: deepfusion train --data DRIVE --init RUN".into())
             }
-            Self::SawReal { .. } => Some("leave --simulated-only out".into()),
+            Self::SawReal { .. } => Some("leave out --simulated-only".into()),
             Self::NoBackend { device } => Some(format!(
-                "build it with `cargo build --release --features {device}`, or use --device cpu"
+                "build deepfusion with `cargo build --release --features {device}`, or use --device cpu"
             )),
             Self::NoSuchDevice {
                 backend, count: 1.., ..

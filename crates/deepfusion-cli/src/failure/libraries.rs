@@ -50,10 +50,8 @@ impl Reportable for deepfusion_sim::Error {
 
     fn hint_in_options(&self) -> Option<String> {
         match self {
-            Self::Config {
-                field, expected, ..
-            } => match simulator_option(field) {
-                Some(option) => Some(format!("{option} takes {expected}")),
+            Self::Config { field, .. } => match simulator_option(field) {
+                Some(option) => Some(format!("correct {option} (see --help)")),
                 None => self.hint(),
             },
             _ => self.hint(),
@@ -211,7 +209,7 @@ impl Reportable for deepfusion_data::Error {
                 )
             }),
             Self::OwnCalibration { .. } => {
-                Some("leave --intrinsics, --hfov and --calib out".into())
+                Some("leave out --intrinsics, --hfov and --calib".into())
             }
             Self::Topic {
                 choice: Some(topic),
@@ -239,9 +237,9 @@ impl Reportable for deepfusion_data::Error {
             }
             Self::NoSegmentVideo { .. } => hint
                 .map(|hint| format!("{hint}; `deepfusion data inspect` reports its other streams")),
-            Self::NoTopics { .. } => Some("leave --topic out, or give bags alone".into()),
-            Self::OneCamera { .. } => Some("leave --camera out, or give 2".into()),
-            Self::DepthKind { .. } => Some("leave --gt-depth out, or give z".into()),
+            Self::NoTopics { .. } => Some("leave out --topic, or give only bags".into()),
+            Self::OneCamera { .. } => Some("leave out --camera, or give 2".into()),
+            Self::DepthKind { .. } => Some("leave out --gt-depth, or give z".into()),
             Self::Video(error) => error.hint_in_options(),
             Self::Log(error) => error.hint_in_options(),
             _ => hint,
@@ -271,8 +269,8 @@ impl Reportable for deepfusion_eval::Error {
                  which leaves them out and counts them in missing_rate"
             )),
             Self::NothingToEvaluate { skipped: 0, .. } => Some(
-                "give --gt FILE, or another --gt-depth if the drive has ground truth of another kind; with the drive's speeds it is \
-                 evaluated without ground truth (deepfusion data import LOG --video FILE)"
+                "give --gt FILE, or another --gt-depth if the drive has ground truth of another kind; a drive with speeds can also be \
+                 evaluated without ground truth (deepfusion data import adds them to a video)"
                     .into(),
             ),
             Self::NothingToEvaluate { .. } => Some(
@@ -295,7 +293,7 @@ impl Reportable for deepfusion_eval::compare::Error {
                     .into(),
             ),
             Self::NotEvaluated { path } => Some(format!(
-                "measure it first: deepfusion eval --model {} --data PATH",
+                "evaluate it first: deepfusion eval --model {} --data PATH",
                 path.display()
             )),
             _ => self.hint(),
@@ -307,7 +305,7 @@ impl Reportable for deepfusion_instances::Error {
     fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Class { known, .. } if known.is_empty() => {
-                Some("leave out --classes to use all of them: the file names no classes".into())
+                Some("leave out --classes to use all of them: the model has no class names".into())
             }
             _ => self.hint(),
         }
@@ -377,7 +375,7 @@ impl Reportable for deepfusion_model::Error {
 
 /// The hint how to set a key of the configuration.
 pub(crate) fn set_in_file(field: &str) -> String {
-    format!("set `{field}` accordingly in the config file or with its option (see --help)")
+    format!("correct `{field}` in the config file or with its option (see --help)")
 }
 
 impl Reportable for deepfusion_onnx::Error {
@@ -429,7 +427,7 @@ impl Reportable for deepfusion_runtime::Error {
                 const WROTE: &str = "give the folder that `train`, `adapt`, `demo` or a command of `weights` wrote";
                 Some(match known.as_slice() {
                     [] => format!(
-                        "{WROTE}; this build has no embedded network: train one with deepfusion train --data DRIVE"
+                        "{WROTE}; this build has no embedded network (deepfusion train --data DRIVE trains a network)"
                     ),
                     known => format!("{WROTE}, or an embedded network: {}", known.join(", ")),
                 })
@@ -465,7 +463,7 @@ impl Reportable for deepfusion_weights::Error {
     fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::NotEmbedded { known, .. } if known.is_empty() => Some(
-                "train one (deepfusion train --data DRIVE) and give its folder: --model RUN".into(),
+                "train a network (deepfusion train --data DRIVE), then give its folder: --model RUN".into(),
             ),
             Self::Card { .. } => Some(
                 "`deepfusion weights pack` writes a card beside the weights; take both from there"
@@ -485,10 +483,6 @@ impl Reportable for deepfusion_train::Error {
         match self {
             Self::Data(error) => error.message(),
             Self::Model(error) => error.message(),
-            Self::Precision { found } => format!(
-                "setting `precision`: expected \"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, or a GPU with tensor cores for it), \
-                 found {found}"
-            ),
             _ => self.to_string(),
         }
     }

@@ -15,7 +15,7 @@ pub enum NoFramesReason {
     #[error("no frame-<number>.color.png or .jpg")]
     NoColour,
     /// None of the image files listed in the tables exists.
-    #[error("not found, nor any other image of {camera} that {table} lists in {}", count_of(*scenes, "scene"))]
+    #[error("no such file, nor any other image of {camera} that {table} lists in {}", count_of(*scenes, "scene"))]
     NotUnpacked {
         /// Name of the camera.
         camera: &'static str,

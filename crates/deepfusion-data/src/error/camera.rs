@@ -91,7 +91,7 @@ impl CameraProblem {
                     config.display()
                 );
             }
-            Self::Several { .. } => "leave the scene out: it must have a single camera",
+            Self::Several { .. } => "leave out the scene: it must have a single camera",
             Self::LinearZoomed { .. } => {
                 "calibrate the camera with the same zoom, and put calibration.yaml beside the video"
             }

@@ -33,7 +33,7 @@ pub enum ConfigProblem {
         key: &'static str,
     },
     /// A named file or folder does not exist.
-    #[error("{key}: {} does not exist", path.display())]
+    #[error("{key}: {}: no such file or folder", path.display())]
     NoFile {
         /// The key.
         key: &'static str,
@@ -47,7 +47,7 @@ pub enum ConfigProblem {
     #[error("[camera] and calibration are both set: keep one of them")]
     CameraAndCalibration,
     /// The profile is unknown.
-    #[error("profile is unknown, expected {}", known.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", "))]
+    #[error("profile is unknown, expected one of {}", known.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", "))]
     NoProfile {
         /// Names of the known profiles.
         known: Vec<&'static str>,

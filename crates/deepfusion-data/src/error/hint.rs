@@ -31,7 +31,7 @@ impl Hint for Error {
             }
             Self::Exists { .. } => "choose another path, or remove it first",
             Self::Unfinished(error) => return error.hint(),
-            Self::Stopped { .. } => "start it again; nothing has to be removed first",
+            Self::Stopped { .. } => "start it again: nothing was left behind",
             Self::Cameras { .. } => "convert each into a folder of its own",
             Self::NoTimes { .. } => "add timestamps.txt, or set fps in dataset.toml",
             Self::Bag(error) => return error.hint(),
@@ -84,7 +84,7 @@ impl Hint for Error {
                     config.display()
                 ));
             }
-            Self::OwnCalibration { .. } => "open it without giving a camera",
+            Self::OwnCalibration { .. } => "open it without another calibration",
             Self::CameraFile { problem, .. } => return Some(problem.hint()),
             Self::Columns { problem, .. } => return Some(problem.hint()),
             Self::Topic { problem, .. } => return Some(problem.hint()),
@@ -117,7 +117,11 @@ impl Hint for Error {
                 problem: ImageProblem::File(problem),
                 ..
             } => problem.hint(),
-            Self::Image { .. } => "use PNG or JPEG images",
+            Self::Image {
+                problem: ImageProblem::NotDepth,
+                ..
+            } => "give depth images as 16-bit grey PNG",
+            Self::Image { .. } => "give a PNG or JPEG image",
             Self::FrameSize { .. } => {
                 "use the images and the calibration of one recording; resized images need their own calibration"
             }
@@ -151,7 +155,7 @@ impl Hint for Error {
             Self::Offsets { .. } => "use [1] for pairs or [-1, 1] for three frames",
             Self::OneFrame { .. } => "train on a longer drive; this one can only be evaluated on",
             Self::Standing { .. } => {
-                "leave the drive out, since a camera standing still shows no parallax, or lower min_speed_mps in the training's configuration"
+                "leave out the drive, since a camera standing still shows no parallax, or lower min_speed_mps in the training's configuration"
             }
             Self::NoPairs {
                 frame_distance_m, ..
@@ -189,5 +193,15 @@ mod tests {
             hint.contains("https://") && !hint.contains(" docs/"),
             "{hint}"
         );
+    }
+
+    #[test]
+    fn the_hint_for_a_depth_image_asks_for_16_bits() {
+        let image = Error::Image {
+            path: "depth/0.png".into(),
+            problem: ImageProblem::NotDepth,
+        };
+        let hint = image.hint().unwrap();
+        assert!(hint.contains("16-bit grey PNG"), "{hint}");
     }
 }

@@ -113,7 +113,7 @@ mod tests {
         };
         assert_eq!(
             error.to_string(),
-            "oxts: not found; it should contain the wheels' speeds"
+            "oxts: no such file or folder; it should contain the wheels' speeds"
         );
         assert_eq!(error.hint().as_deref(), Some("record them"));
     }

@@ -17,7 +17,7 @@ pub enum ImageProblem {
     #[error("not a depth image: expected a 16-bit grey PNG")]
     NotDepth,
     /// The recording has no image with this number.
-    #[error("there is no image {0}")]
+    #[error("no image {0}")]
     NoImage(u64),
     /// A message is no longer where it was in the bag.
     #[error("{topic}: no message at {time}")]

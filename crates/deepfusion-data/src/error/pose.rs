@@ -67,7 +67,7 @@ pub enum PoseProblem {
 #[non_exhaustive]
 pub enum PoseFileProblem {
     /// A word is not a number.
-    #[error("a word is not a number")]
+    #[error("a value is not a number")]
     NotANumber,
     /// The file has too many numbers, or too few.
     #[error("{}, expected 16", count_of(*found, "number"))]

@@ -139,7 +139,7 @@ impl TopicProblem {
             Self::PointTimes { .. } => {
                 "set lidar.time_field to a field with seconds or whole nanoseconds after the message's time, or dates; without it, all points get the message's time".into()
             }
-            Self::Cloud(_) => "report this as a bug, with the recording".into(),
+            Self::Cloud(_) => "this is a bug: please report it, with the recording".into(),
         }
     }
 

@@ -121,7 +121,7 @@ fn of_what_is_missing(warning: &IncompleteWarning) -> &'static str {
         IncompleteWarning::Damaged(_) | IncompleteWarning::Unreadable { .. } => {
             "copy the bag again; `rosbag reindex` (`ros2 bag reindex`) repairs one whose recording was cut off"
         }
-        IncompleteWarning::PassedOver { .. } => "to read them too, give their own paths",
+        IncompleteWarning::PassedOver { .. } => "give their own paths to read them too",
         IncompleteWarning::NoImages { .. } | IncompleteWarning::ImagesMissing { .. } => {
             "fetch or unpack the images that are missing"
         }

@@ -47,7 +47,7 @@ impl OpeningReason {
             Self::Recording(error) => {
                 return error.hint().unwrap_or_else(|| super::CORRECT.to_owned());
             }
-            Self::Image(_) => "copy the recording again, or leave the frame out",
+            Self::Image(_) => "copy the recording again, or leave out the frame",
             Self::NoPair { problem, .. } => {
                 let known = "training needs pairs of frames with a known motion";
                 return problem.hint().unwrap_or_else(|| known.to_owned());

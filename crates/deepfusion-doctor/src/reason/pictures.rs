@@ -82,12 +82,14 @@ impl PicturesReason {
             Self::BrightnessJumps { .. } => {
                 "record again with fixed exposure and gain, or let them change slowly"
             }
-            Self::Dark => "expose longer, or leave the darkest drives out",
-            Self::White => "expose shorter",
+            Self::Dark => "use a longer exposure, or leave out the darkest drives",
+            Self::White => "use a shorter exposure",
             Self::Soft => {
-                "focus the lens, clean the windscreen or expose shorter; use enlarged pictures at half their size"
+                "focus the lens, clean the windscreen or use a shorter exposure; use enlarged pictures at half their size"
             }
-            Self::Blurred { .. } => "expose shorter, fix the mount, or leave these frames out",
+            Self::Blurred { .. } => {
+                "use a shorter exposure, fix the mount, or leave out these frames"
+            }
             Self::StillRim {
                 side,
                 pixels,

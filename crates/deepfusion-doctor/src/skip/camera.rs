@@ -19,7 +19,7 @@ pub enum CameraSkip {
     NoMount,
     /// Too little of the road was measured.
     #[error(
-        "the measured depth shows the road ahead in {}, {needed} are needed",
+        "the measured depth shows the road ahead in {}, expected at least {needed}",
         count_of(*frames, "frame")
     )]
     LittleRoad {
@@ -78,7 +78,7 @@ fn together(unsure: &[UnsureHeading]) -> String {
 
 /// Too few images from which to find the camera's direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{} straight ahead, {needed} are needed", count_of(*straight, "pair"))]
+#[error("{} straight ahead, expected at least {needed}", count_of(*straight, "pair"))]
 #[non_exhaustive]
 pub struct NoHeading {
     /// Number of pairs that were taken driving straight ahead.
@@ -110,7 +110,7 @@ mod tests {
                     straight: 1,
                     needed: 12,
                 }),
-                "1 pair straight ahead, 12 are needed",
+                "1 pair straight ahead, expected at least 12",
             ),
             (
                 CameraSkip::Unsure([HeadingAngle::Pitch, HeadingAngle::Yaw].map(unsure).into()),
@@ -125,7 +125,7 @@ mod tests {
                     frames: 3,
                     needed: 4,
                 },
-                "the measured depth shows the road ahead in 3 frames, 4 are needed",
+                "the measured depth shows the road ahead in 3 frames, expected at least 4",
             ),
             (
                 CameraSkip::UnevenRoad {

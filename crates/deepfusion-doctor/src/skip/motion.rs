@@ -37,7 +37,7 @@ pub enum MotionSkip {
         below_mps: f64,
     },
     /// The vehicle turns too little at low speed.
-    #[error("{turning_s:.1} s of turning below {below_mps} m/s, {needed_s} s are needed")]
+    #[error("{turning_s:.1} s of turning below {below_mps} m/s, expected at least {needed_s} s")]
     FewSlowTurns {
         /// Time during which it turns, seconds.
         turning_s: f64,
@@ -47,7 +47,7 @@ pub enum MotionSkip {
         needed_s: f64,
     },
     /// Too few pictures show a turn.
-    #[error("{} with a turn, {needed} are needed", count_of(*pairs, "pair"))]
+    #[error("{} with a turn, expected at least {needed}", count_of(*pairs, "pair"))]
     FewTurns {
         /// Number of pairs with a turn.
         pairs: usize,
@@ -56,7 +56,7 @@ pub enum MotionSkip {
     },
     /// The vehicle drives straight ahead.
     #[error(
-        "the vehicle hardly turns (yaw rate ±{spread_radps:.3} rad/s, {needed_radps} are needed)"
+        "the vehicle hardly turns (yaw rate ±{spread_radps:.3} rad/s, expected at least {needed_radps})"
     )]
     HardlyTurns {
         /// The standard deviation of its yaw rate, rad/s.
@@ -107,21 +107,21 @@ mod tests {
                     below_mps: 8.0,
                     needed_s: 3.0,
                 },
-                "1.3 s of turning below 8 m/s, 3 s are needed",
+                "1.3 s of turning below 8 m/s, expected at least 3 s",
             ),
             (
                 MotionSkip::FewTurns {
                     pairs: 1,
                     needed: 15,
                 },
-                "1 pair with a turn, 15 are needed",
+                "1 pair with a turn, expected at least 15",
             ),
             (
                 MotionSkip::HardlyTurns {
                     spread_radps: 0.0042,
                     needed_radps: 0.015,
                 },
-                "the vehicle hardly turns (yaw rate ±0.004 rad/s, 0.015 are needed)",
+                "the vehicle hardly turns (yaw rate ±0.004 rad/s, expected at least 0.015)",
             ),
         ] {
             assert_eq!(reason.to_string(), message);

@@ -1,6 +1,7 @@
 //! Errors when trajectories are compared, and in their files.
 
-use deepfusion_hint::{Hint, count_of, system_hint};
+use deepfusion_fs::FileError;
+use deepfusion_hint::{Hint, count_of};
 use std::path::PathBuf;
 
 /// Two trajectories that cannot be compared.
@@ -75,13 +76,8 @@ impl Hint for TrackError {
 #[non_exhaustive]
 pub enum PoseFileError {
     /// The file cannot be opened or written.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// Path of the file.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A line is not a pose.
     #[error("{}:{line}: {problem}", path.display())]
     Line {
@@ -103,7 +99,7 @@ pub enum PoseFileError {
 impl Hint for PoseFileError {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::Io { source, .. } => Some(system_hint(source.kind()).into()),
+            Self::File(error) => error.hint(),
             Self::Line { .. } | Self::Empty { .. } => Some(
                 "write one pose of the camera in the world per line: KITTI's 12 numbers (the rows of [R t]), or TUM's \
                  8 (time tx ty tz qx qy qz qw); # starts a comment"

@@ -1,5 +1,6 @@
 use super::pose_text::{Line, parse_line};
 use super::{PoseFileError, PoseLineProblem, TrackError, TrackPair};
+use deepfusion_fs::FileError;
 use deepfusion_geometry::Se3;
 use std::path::{Path, PathBuf};
 
@@ -35,10 +36,7 @@ impl PoseFile {
     /// [`PoseFileError`], with the line, if the number of columns changes, a value is not a finite number, a matrix or a quaternion is not
     /// a rotation, or a time does not increase.
     pub fn read(path: &Path) -> Result<Self, PoseFileError> {
-        let bytes = std::fs::read(path).map_err(|source| PoseFileError::Io {
-            path: path.to_owned(),
-            source,
-        })?;
+        let bytes = std::fs::read(path).map_err(|source| FileError::new(path, source))?;
         Self::parse(path, &String::from_utf8_lossy(&bytes))
     }
 
@@ -161,6 +159,12 @@ mod tests {
     fn same(a: &[Se3], b: &[Se3]) -> bool {
         let near = |(a, b): (&Se3, &Se3)| (a.matrix() - b.matrix()).norm() < 1e-9;
         a.len() == b.len() && a.iter().zip(b).all(near)
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let error = PoseFile::read(Path::new("nowhere.txt")).unwrap_err();
+        assert_eq!(error.to_string(), "nowhere.txt: no such file or folder");
     }
 
     #[test]

@@ -161,12 +161,12 @@ impl CalibrationReport<'_> {
     /// How many views were used, and of how many pictures and frames.
     fn counted_views(&self) -> String {
         let used = self.calibration.used();
-        let looked_at = format!("{used} used of {} looked at", self.looked_at);
+        let used = format!("{used} of {} used", self.looked_at);
         if self.not_picked == 0 {
-            return looked_at;
+            return used;
         }
         format!(
-            "{looked_at}; {} more show the board as one of these does",
+            "{used}; {} more show the board in the same pose as one of these",
             self.not_picked
         )
     }

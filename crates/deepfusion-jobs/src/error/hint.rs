@@ -77,7 +77,7 @@ impl Hint for Error {
                 }
                 .into(),
             ),
-            Self::Occupied { .. } => Some("choose a new folder".into()),
+            Self::Occupied { .. } => Some("choose another folder, or empty this one first".into()),
             Self::Shares { .. } => {
                 Some("give one positive number for each network, in the same order, such as 2,1".into())
             }

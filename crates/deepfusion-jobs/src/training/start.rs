@@ -68,7 +68,7 @@ impl fmt::Display for StartReport<'_> {
         let new = match self {
             Self::NoneFits => {
                 return f.write_str(
-                    "starts from nothing: no embedded network has this configuration's layers and depth range",
+                    "starts from random weights: no embedded network has this configuration's layers and depth range",
                 );
             }
             Self::Packed {
@@ -349,7 +349,7 @@ impl Start {
                 model.depth_net = depth_net;
                 let pose_net = model.pose_net.is_some().then_some("PoseNet");
                 let mut new: Vec<_> = pose_net.into_iter().collect();
-                new.extend(new_head.then_some("the head for uncertainty"));
+                new.extend(new_head.then_some("the uncertainty head"));
                 let path = path.as_deref();
                 report(StartReport::Packed { network, path, new });
                 Ok(model)

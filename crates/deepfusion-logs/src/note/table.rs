@@ -47,7 +47,7 @@ pub enum TableNote {
     #[error(
         "{absent} of {} {} left out",
         count_of(*rows, "row"),
-        if *absent == 1 { "holds no speed and is" } else { "hold no speed and are" }
+        if *absent == 1 { "has no speed and is" } else { "have no speed and are" }
     )]
     NoSpeed {
         /// Number of rows without a speed.
@@ -206,7 +206,7 @@ mod tests {
             ),
             (
                 TableNote::NoSpeed { absent: 2, rows },
-                "2 of 20 rows hold no speed and are left out",
+                "2 of 20 rows have no speed and are left out",
             ),
             (
                 TableNote::Repeated { repeated: 4, rows },
@@ -214,7 +214,7 @@ mod tests {
             ),
             (
                 TableNote::NoSpeed { absent: 1, rows },
-                "1 of 20 rows holds no speed and is left out",
+                "1 of 20 rows has no speed and is left out",
             ),
             (
                 TableNote::Repeated {

@@ -7,10 +7,13 @@ use deepfusion_hint::count_of;
 #[non_exhaustive]
 pub enum SignalProblem {
     /// There is no DBC file.
-    #[error("a DBC file that describes its frames is needed")]
+    #[error("a CAN trace needs a DBC file that describes its frames")]
     NoDbc,
     /// No signal was named.
-    #[error("it is not known which signal is the speed{}", by_name(candidates))]
+    #[error(
+        "it is not known which signal of the CAN trace is the speed{}",
+        by_name(candidates)
+    )]
     NoName {
         /// Signals of the DBC file whose name contains speed.
         candidates: Vec<String>,

@@ -25,7 +25,7 @@ pub enum NetworkError {
 
     /// An input size the encoder cannot halve five times.
     #[error(
-        "network input of {width}×{height} pixels: width and height must be multiples of 32, at least 64"
+        "network input of {width}x{height} pixels: width and height must be multiples of 32, at least 64"
     )]
     InputSize {
         /// Width in pixels.
@@ -207,7 +207,7 @@ impl Hint for NetworkError {
             Self::InputSize { width, height } => {
                 let nearest = |n: usize| (n.max(64) + 16) / 32 * 32;
                 return Some(format!(
-                    "the nearest valid size is {}×{}",
+                    "the nearest valid size is {}x{}",
                     nearest(*width),
                     nearest(*height)
                 ));

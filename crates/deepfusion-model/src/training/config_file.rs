@@ -162,18 +162,18 @@ mod tests {
         for (assignment, expected) in [
             (
                 "bacth=3",
-                "bacth=3: there is no key `bacth`: did you mean `batch`?",
+                "bacth=3: unknown key `bacth`: did you mean `batch`?",
             ),
             (
                 "loss.smothness=0.1",
-                "loss.smothness=0.1: there is no key `loss.smothness`: did you mean `loss.smoothness`?",
+                "loss.smothness=0.1: unknown key `loss.smothness`: did you mean `loss.smoothness`?",
             ),
-            ("hope=1", "hope=1: there is no key `hope`"),
+            ("hope=1", "hope=1: unknown key `hope`"),
         ] {
             assert_eq!(message(assignment), expected);
         }
         // The key exists, but the value is invalid.
-        assert!(!message("batch=many").contains("there is no key"));
+        assert!(!message("batch=many").contains("unknown key"));
     }
 
     #[test]

@@ -252,7 +252,7 @@ mod tests {
         }
         assert_eq!(
             message("assumed_camera.hfov", None),
-            "there is no key `assumed_camera.hfov`: did you mean `assumed_camera.hfov_deg`?"
+            "unknown key `assumed_camera.hfov`: did you mean `assumed_camera.hfov_deg`?"
         );
     }
 
@@ -274,7 +274,7 @@ mod tests {
         );
         assert_eq!(
             message("augmentation.seizes[0].width", value()),
-            "there is no key `augmentation.seizes[0].width`: did you mean `augmentation.sizes[0].width`?"
+            "unknown key `augmentation.seizes[0].width`: did you mean `augmentation.sizes[0].width`?"
         );
     }
 

@@ -68,7 +68,7 @@ pub enum ExpectedSetting {
     #[error("below {0} rad/s")]
     AngularRateBelow(f64),
     /// An image size that can be aligned.
-    #[error("at least {width}×{height} pixels")]
+    #[error("at least {width}x{height} pixels")]
     PictureSize {
         /// Smallest width.
         width: usize,
@@ -133,7 +133,7 @@ mod tests {
                     width: 32,
                     height: 16,
                 },
-                "at least 32×16 pixels",
+                "at least 32x16 pixels",
             ),
             (Expected::AllPixels, "width × height"),
         ] {

@@ -6,10 +6,10 @@ use deepfusion_hint::Hint;
 fn sizes_that_do_not_halve_five_times_are_refused_with_the_nearest_valid_one() {
     assert!(InputSize::new(640, 192).is_ok());
     let error = InputSize::new(1242, 375).unwrap_err();
-    assert!(error.to_string().contains("1242×375"), "{error}");
+    assert!(error.to_string().contains("1242x375"), "{error}");
     assert_eq!(
         error.hint().as_deref(),
-        Some("the nearest valid size is 1248×384")
+        Some("the nearest valid size is 1248x384")
     );
     assert!(InputSize::new(64, 32).is_err());
 }

@@ -340,7 +340,7 @@ pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
     assert_eq!(
         coords.dims()[..2],
         [image.dims()[0], 2],
-        "two coordinates for each pixel"
+        "two coordinates per pixel"
     );
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_warp(
         image.into_dispatch(),

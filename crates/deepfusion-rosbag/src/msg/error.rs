@@ -29,7 +29,7 @@ pub enum MessageError {
         field: String,
     },
     /// A ROS 2 message has another layout than plain CDR.
-    #[error("encapsulation {found:#06x}: expected plain CDR, 0x0000 or 0x0001")]
+    #[error("encapsulation {found:#06x}, expected plain CDR, 0x0000 or 0x0001")]
     Encapsulation {
         /// The representation's number.
         found: u16,
@@ -59,7 +59,7 @@ pub enum MessageError {
         problem: LayoutProblem,
     },
     /// An image's encoding is unknown, or not one of those requested.
-    #[error("encoding `{encoding}`: expected {expected}")]
+    #[error("encoding `{encoding}`, expected {expected}")]
     Encoding {
         /// The image's encoding.
         encoding: String,
@@ -208,10 +208,10 @@ impl Hint for MessageError {
     fn hint(&self) -> Option<String> {
         let text = match self {
             Self::Short { .. } | Self::Long { .. } | Self::Text { .. } => {
-                "the message is damaged, or was recorded with another definition than its MD5 says"
+                "copy the bag again: the message is damaged, or was recorded with another definition than its MD5 says"
             }
             Self::Encapsulation { .. } => {
-                "the message is damaged, or its middleware wrote XCDR version 2 or parameter lists, which are not read"
+                "copy the bag again, or record it with a middleware that writes plain CDR, not XCDR version 2 or parameter lists"
             }
             Self::NoField { .. } => "name one of the listed fields",
             Self::Datatype { .. } | Self::Layout { .. } => {

@@ -49,7 +49,7 @@ pub enum IndexProblem {
         connection: u32,
     },
     /// A chunk has index data of a connection that it should not contain.
-    #[error("index data of connection {connection}, which the chunk should not hold")]
+    #[error("index data of connection {connection}, which the chunk should not have")]
     StrayData {
         /// The connection's number.
         connection: u32,

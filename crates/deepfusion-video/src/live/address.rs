@@ -252,7 +252,7 @@ mod tests {
         let error = wrong.check().unwrap_err();
         assert_eq!(
             error.to_string(),
-            "camera:0?sise=1x1: a camera has no setting `sise`"
+            "camera:0?sise=1x1: unknown setting `sise`"
         );
         assert!(error.hint().unwrap().contains("size="), "{error:?}");
         assert!(wrong.input("linux").is_err());

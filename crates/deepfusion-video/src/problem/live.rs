@@ -88,8 +88,8 @@ impl LiveProblem {
                 kind: SourceKind::Camera,
                 ..
             } => {
-                "is it plugged in, free, and yours to read? `v4l2-ctl --list-devices` lists the cameras of Linux, \
-                 `ffmpeg -sources` those ffmpeg knows"
+                "check that it is plugged in, not in use, and that you may read it; `v4l2-ctl --list-devices` lists the cameras \
+                 on Linux, `ffmpeg -sources` those that ffmpeg finds"
             }
             Self::Lost { .. } => {
                 "check that the source is running and the address is right; `ffplay ADDRESS` shows what it sends"
@@ -135,7 +135,7 @@ pub enum LiveFrameProblem {
 #[non_exhaustive]
 pub enum CameraModeProblem {
     /// The setting does not exist.
-    #[error("a camera has no setting `{0}`")]
+    #[error("unknown setting `{0}`")]
     Unknown(String),
     /// A setting is given twice.
     #[error("setting `{0}` is given twice")]

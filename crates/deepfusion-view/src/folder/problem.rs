@@ -44,8 +44,8 @@ pub enum FrameProblem {
     /// The sidecar has no camera.
     #[error("the camera is unknown: no cloud, no boxes on the picture")]
     NoCamera,
-    /// The sidecar's camera is impossible.
-    #[error("the sidecar's camera is impossible: {0}")]
+    /// The sidecar's camera is invalid.
+    #[error("the sidecar's camera is invalid: {0}")]
     Camera(ImplausibleCamera),
     /// The sidecar lacks the image's size.
     #[error("the sidecar lacks the image's size")]
@@ -129,7 +129,7 @@ mod tests {
                     name: "fx",
                     value: 0.0,
                 }),
-                "the sidecar's camera is impossible: fx is 0, expected a focal length above 0",
+                "the sidecar's camera is invalid: fx is 0, expected a focal length above 0",
             ),
         ] {
             assert_eq!(problem.to_string(), text);

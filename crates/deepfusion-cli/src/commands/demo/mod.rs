@@ -33,7 +33,7 @@ const DEMO: &str = "the demo";
 pub(super) fn run(args: &DemoArgs) -> Result<()> {
     // Only the first notice is used: those of training and `perceive`, about continuing, do not apply here.
     interrupt::catch(
-        "stopping after the frames, step or image at work; the demo cannot be resumed",
+        "stopping after the current frames, step or image; the demo cannot be resumed",
     );
     let embedded = if args.from_scratch {
         None

@@ -63,7 +63,7 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
     if !prediction.overwrite {
         require_unwritten(&job.writer, &args.save, &all)?;
     }
-    interrupt::catch("stopping after the frames at work");
+    interrupt::catch("stopping after the current frames");
     match source {
         Some(address) => live::run(args, &job, finder, &address),
         None => perceive_images(args, &job, finder, &all),

@@ -34,7 +34,7 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     // Before old frames are removed: another run may be writing them.
     let _lock = Lock::take_whole(out)?;
     live::make_room(out, prediction.overwrite)?;
-    interrupt::catch("stopping after the frames at work");
+    interrupt::catch("stopping after the current frames");
     let mut feed = open(address, &job.loader.camera, prediction)?;
     let written = |sidecar: &Sidecar| -> Result<()> {
         if args.json {

@@ -52,7 +52,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
         return Err(Error::NoCamera.into());
     }
     output::make_folder(out)?;
-    interrupt::catch("stopping after the images at work; the same command continues from there");
+    interrupt::catch("stopping after the current images; the same command continues from there");
     let _lock = Lock::take(out, *shard)?;
     let StartedJob {
         manifest,

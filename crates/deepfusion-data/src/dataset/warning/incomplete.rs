@@ -90,16 +90,31 @@ fn passed_over(folder: &Path, layout: DatasetKind, recordings: &[String]) -> Str
         None | Some(0) => String::new(),
         Some(more) => format!(" and {more} more"),
     };
-    let (these, are, each) = if recordings.len() == 1 {
-        ("this", "looks like a recording and is", "it")
+    let (are, each) = if recordings.len() == 1 {
+        ("looks like a recording and is", "it")
     } else {
-        ("these", "look like recordings and are", "each")
+        ("look like recordings and are", "each")
     };
     format!(
-        "{} is read only as {}; {these} in it {are} not read: {listed}{more} (give {each} by its own path)",
+        "{} is read only as {}; {listed}{more} in it {are} not read (give {each} by its own path)",
         folder.display(),
-        layout.label()
+        with_article(layout)
     )
+}
+
+/// The layout's name, with an article unless it is a proper name.
+fn with_article(layout: DatasetKind) -> String {
+    let label = layout.label();
+    match layout {
+        DatasetKind::KittiRaw
+        | DatasetKind::KittiOdometry
+        | DatasetKind::Kitti360
+        | DatasetKind::NuScenes => label.to_owned(),
+        DatasetKind::Folder | DatasetKind::RgbD => format!("an {label}"),
+        DatasetKind::Video | DatasetKind::Comma2k19 | DatasetKind::Bag | DatasetKind::Other => {
+            format!("a {label}")
+        }
+    }
 }
 
 fn messages_come(messages: u64) -> String {
@@ -136,10 +151,10 @@ mod tests {
         };
         assert_eq!(
             message(1),
-            "drives is read only as image folder; this in it looks like a recording and is not read: drive1.bag (give it by its own path)"
+            "drives is read only as an image folder; drive1.bag in it looks like a recording and is not read (give it by its own path)"
         );
-        let these = "drives is read only as image folder; these in it look like recordings and are not read: drive1.bag, drive2.bag";
-        let each = "(give each by its own path)";
+        let these = "drives is read only as an image folder; drive1.bag, drive2.bag";
+        let each = "in it look like recordings and are not read (give each by its own path)";
         assert_eq!(message(2), format!("{these} {each}"));
         let six = format!("{these}, drive3.bag, drive4.bag, drive5.bag, drive6.bag");
         assert_eq!(message(6), format!("{six} {each}"));

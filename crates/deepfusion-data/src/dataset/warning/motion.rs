@@ -124,7 +124,7 @@ pub enum MotionWarning {
     },
     /// The speeds are computed from a GPS receiver's positions.
     #[error(
-        "{topic}: speeds are computed from its positions and smoothed; median standard deviation {sigma_mps:.2} m/s"
+        "{topic}: speeds from its positions, smoothed, with a median standard deviation of {sigma_mps:.2} m/s"
     )]
     OfPositions {
         /// Name of the topic.
@@ -266,7 +266,7 @@ mod tests {
                     topic: topic(),
                     sigma_mps: 0.123,
                 },
-                "/gnss/fix: speeds are computed from its positions and smoothed; median standard deviation 0.12 m/s",
+                "/gnss/fix: speeds from its positions, smoothed, with a median standard deviation of 0.12 m/s",
             ),
             (
                 MotionWarning::Commanded {

@@ -457,7 +457,7 @@ mod tests {
         assert_eq!(passed_over(at), None);
         write(at, &["other/clip.mp4"]);
         let expected = format!(
-            "{} is read only as video; this in it looks like a recording and is not read: other (give it by its own path)",
+            "{} is read only as a video; other in it looks like a recording and is not read (give it by its own path)",
             at.display()
         );
         assert_eq!(passed_over(at), Some(expected));
