@@ -159,7 +159,7 @@ pub(crate) enum CliError {
         hint: Option<String>,
     },
     /// A folder whose only images were written by this program.
-    #[error("{input}: contains no images other than outputs of this program")]
+    #[error("{input}: no images, only outputs of this program")]
     OutputsAlone {
         /// What was given.
         input: String,

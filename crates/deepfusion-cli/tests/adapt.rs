@@ -139,6 +139,6 @@ fn an_interrupted_adaptation_is_continued() {
         "simulate --frames 4 --seed 3 --scan-every 0 --out short",
     );
     let short = ADAPT.replace("drive", "short");
-    fails(at, &format!("{short} --out other"), &["held out"]);
+    fails(at, &format!("{short} --out other"), &["held-out"]);
     assert!(!at.join("other").exists() && !at.join("other.adapting").exists());
 }

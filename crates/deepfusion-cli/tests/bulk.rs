@@ -114,7 +114,10 @@ fn shards_started_at_once_write_what_one_run_writes() {
     fails(
         at,
         &format!("{predict} more/0000000000_depth.png --out more"),
-        &["0000000000_depth.png: no image", "hint: give the images"],
+        &[
+            "0000000000_depth.png: no images, only outputs",
+            "hint: give the images",
+        ],
     );
     // Nor are they if outputs go elsewhere.
     ok(at, &format!("{predict} more --out apart"));

@@ -181,7 +181,7 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     let mut config = fs::read_to_string(at.join("straight/dataset.toml")).unwrap();
     config += "[clock]\ncamera_ahead_s = 0.7\n";
     fs::write(at.join("straight/dataset.toml"), config).unwrap();
-    fails(at, both, &["straight: it says", "+0.700 s"]);
+    fails(at, both, &["straight: its file gives", "+0.700 s"]);
 }
 
 #[test]

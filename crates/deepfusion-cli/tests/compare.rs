@@ -138,7 +138,7 @@ fn runs_are_reported_kept_and_compared() {
         &["expected a run's folder for the pictures"],
     );
     fs::write(at.join("broken.json"), &printed[..printed.len() / 2]).unwrap();
-    fails(at, "compare broken.json", &["no evaluation"]);
+    fails(at, "compare broken.json", &["not an evaluation"]);
     fails(at, "compare nowhere.json", &["nowhere.json"]);
     let bad = run(at, "compare");
     assert_eq!(bad.code, 2, "{}", bad.stderr);

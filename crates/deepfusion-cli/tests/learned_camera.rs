@@ -66,7 +66,7 @@ fn a_drive_without_a_calibration_is_trained_on_and_predicted() {
     let train = "train --data drive --preset tiny --size 96x64 --batch 2 --init none --steps 2";
     let options = "--intrinsics learn --view-motion vehicle --set assumed_camera.hfov_deg=70";
     let run = ok(at, &format!("{train} {options} --out run"));
-    for part in ["assumed", "camera learned: fx", "pixels of 320x96"] {
+    for part in ["assuming fx", "camera learned: fx", "pixels of 320x96"] {
         assert!(run.stderr.contains(part), "no `{part}` in {}", run.stderr);
     }
     let config: toml::Table = fs::read_to_string(at.join("run/config.toml"))

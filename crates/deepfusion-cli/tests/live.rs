@@ -253,10 +253,13 @@ fn a_source_that_cannot_be_opened_is_an_error() {
     };
     let image = "street/2026_01_01/2026_01_01_drive_0005_sync/image_02/data/0000000003.png";
     let cases = [
-        ("predict --model run camera:0 - --out a".to_owned(), "alone"),
+        (
+            "predict --model run camera:0 - --out a".to_owned(),
+            "combined with other inputs",
+        ),
         (
             format!("perceive --model run camera:0 {image} --out a"),
-            "alone",
+            "combined with other inputs",
         ),
         (
             "predict --model run - --shard 1/2 --out a".to_owned(),

@@ -632,7 +632,7 @@ fn each_of_two_cameras_is_a_view_of_the_other() {
     }
     ok(at, "train --out run --resume --steps 3 --stereo");
     let refused = format!("{train} --data one --out other");
-    fails(at, &refused, &["other camera", "image_03"]);
+    fails(at, &refused, &["second camera", "image_03"]);
     fails(
         at,
         "simulate --format bag --stereo 0.5 --frames 2 --out bag",

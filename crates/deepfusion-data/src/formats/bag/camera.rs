@@ -233,7 +233,7 @@ mod tests {
         for (model, d, why) in [
             ("equidistant", &d[..0], "k1, k2, k3, k4"),
             ("equidistant", &[f64::NAN; 4], "NaN"),
-            ("division", &d, "division is not known"),
+            ("division", &d, "distortion_model is division, expected"),
         ] {
             let error = read(model, d).unwrap_err().to_string();
             assert!(error.contains(why), "{error}");

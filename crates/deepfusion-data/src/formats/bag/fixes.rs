@@ -162,7 +162,7 @@ mod tests {
         let warnings = warnings.join("\n");
         for part in [
             "2 of 20 messages left out for lack of a position",
-            "median standard deviation 0.",
+            "median standard deviation of 0.",
             "vehicle.max_gap_s",
             "up to 3.0 s",
         ] {

@@ -489,7 +489,10 @@ mod tests {
         assert_eq!(passed_over(at), None);
         write(at, &["week/monday/0.png", "week/dataset.toml"]);
         let message = passed_over(at).unwrap();
-        assert!(message.contains("and is not read: week"), "{message}");
+        assert!(
+            message.contains("week in it looks like a recording and is not read"),
+            "{message}"
+        );
     }
 
     #[test]
