@@ -98,7 +98,7 @@ def networks() -> list[str]:
 
 
 def devices() -> list[str]:
-    """Backends that this package was built with, as `device` names them: "cpu", and those for GPUs that were asked for.
+    """Values of `device` that this package supports: "cpu", and the GPU backends that it was built with.
 
     In a checkout, `pip install ./python --config-settings=build-args="--features cuda"` builds it with CUDA.
     """
@@ -123,14 +123,14 @@ def evaluate(
     """Computes the field's seven metrics, unscaled and median-scaled: the report that `deepfusion eval --json` prints.
 
     `predictions` are H x W arrays of metres (`kind="depth"`) or of 1/m (`kind="disparity"`), of any size, or results of
-    `Model.predict`, from which `kind` takes one or the other. `ground_truth` are H x W arrays of metres, 0 where nothing was
+    `Model.predict`, of which `kind` selects depth or disparity. `ground_truth` are H x W arrays of metres, 0 where nothing was
     measured; None leaves the image out. Both are consumed pair by pair, so generators work. `crop` is "none" or "garg"; only depths
     between `min_depth` and `cap` metres are measured.
 
-    With `allow_holes`, predicted values that are NaN, infinite or not above 0 mean that there is none: they are left out, and counted
-    as `missing_rate`. `gt_depth` states in the report which depth the ground truth is: "z", "velodyne" or "annotated". `scale` adds a
-    row with a fixed factor. `points` is the number of pixels to sample for the statistics of points, and `points_seed` decides which.
-    `names` are the images' names in messages.
+    With `allow_holes`, predicted values that are NaN, infinite or not above 0 mean that there is no prediction: they are left out, and
+    counted as `missing_rate`. `gt_depth` states in the report which depth the ground truth is: "z", "velodyne" or "annotated". `scale`
+    adds a row with a fixed factor. `points` is the number of pixels to sample for the statistics of points, and `points_seed` decides
+    which. `names` are the images' names in messages.
     """
     if isinstance(predictions, Sized) and isinstance(ground_truth, Sized) and len(predictions) != len(ground_truth):
         raise ValueError(f"predictions: expected {len(ground_truth)}, one for each image of ground_truth, found {len(predictions)}")
@@ -139,8 +139,9 @@ def evaluate(
     evaluation = _native.Evaluation(kind, crop, cap, min_depth, allow_holes, gt_depth, scale, points, points_seed)
     columns = (predictions, ground_truth) if names is None else (predictions, ground_truth, names)
     for i, row in enumerate(zip_longest(*columns, fillvalue=_ENDED)):
-        if any(value is _ENDED for value in row):
-            raise ValueError("predictions, ground_truth and names: one of them has " + (f"only {i}" if i else "none") + ", another has more")
+        ended = [name for name, value in zip(("predictions", "ground_truth", "names"), row) if value is _ENDED]
+        if ended:
+            raise ValueError(f"{' and '.join(ended)}: found only {i}, expected one for each image")
         prediction, truth = row[:2]
         if truth is None:
             continue
@@ -151,7 +152,7 @@ def evaluate(
 
 
 _ENDED = object()
-"""Stands for the values that an iterable no longer has."""
+"""Fills the row of an iterable that has ended."""
 
 
 def _plane(values: ArrayLike, what: str) -> NDArray[np.float64]:
@@ -196,5 +197,5 @@ def doctor(
     clock_offset_ms: float | None = None,
 ) -> dict[str, Any]:
     """Lists every reason why training on a recording would fail or give a wrong scale: the report that `deepfusion doctor PATH --json`
-    prints, also for a speed log by itself. What the recording does not say can be passed as to `Dataset`."""
+    prints. `path` may also be a speed log alone. What the recording lacks can be passed as to `Dataset`."""
     return json.loads(_native.doctor(path, intrinsics, hfov_deg, topics, clock_offset_ms))

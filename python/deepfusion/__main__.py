@@ -10,8 +10,8 @@ from . import _native
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command line with these arguments, or the process's own, and returns its exit code. It is meant to be all that a process
-    does: from then on, the command handles Ctrl-C."""
+    """Runs the command line with these arguments, or the process's own, and returns its exit code. For a process that does
+    nothing else: from then on, the command handles Ctrl-C."""
     # Otherwise Python would defer Ctrl-C until the command has ended.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     return _native.command(list(sys.argv[1:] if arguments is None else arguments))

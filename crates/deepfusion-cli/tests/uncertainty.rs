@@ -159,7 +159,7 @@ fn uncertainty_is_evaluated_calibrated_and_written() {
     }
     let table = ok(at, eval).stdout;
     assert!(
-        table.contains("the 80 % intervals contain") && table.contains("(calibrated)"),
+        table.contains("sigma   the 80 % intervals contain") && table.contains("(calibrated)"),
         "{table}"
     );
 

@@ -139,7 +139,7 @@ fn a_drive_without_ground_truth_has_a_verdict() {
         "too little road",
         "reprojection",
         "mirrored",
-        "seen through the depth",
+        "from depth",
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }

@@ -137,7 +137,7 @@ fn interval_lines(f: &mut fmt::Formatter<'_>, intervals: &Intervals) -> fmt::Res
     for row in &intervals.levels {
         writeln!(
             f,
-            "sure    the {:.0} % intervals contain the truth for {:.1} % of the pixels; width {:.0} % of the depth ({whose})",
+            "sigma   the {:.0} % intervals contain the truth for {:.1} % of the pixels; mean width {:.0} % of the depth ({whose})",
             100.0 * row.level,
             100.0 * row.coverage,
             100.0 * row.width_rel,

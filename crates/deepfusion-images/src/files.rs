@@ -90,7 +90,7 @@ pub fn image_size(path: &Path) -> Result<(u32, u32)> {
 ///
 /// # Errors
 /// As [`load_rgb`].
-pub fn check_whole(path: &Path) -> Result<()> {
+pub fn check_complete(path: &Path) -> Result<()> {
     if has_both_ends(path).unwrap_or(false) {
         return Ok(());
     }
@@ -206,10 +206,10 @@ mod tests {
             let path = folder.path().join(name);
             noisy.save(&path).unwrap();
             assert!(has_both_ends(&path).unwrap(), "{name}");
-            check_whole(&path).unwrap();
+            check_complete(&path).unwrap();
             let bytes = std::fs::read(&path).unwrap();
             std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-            let error = check_whole(&path).unwrap_err().to_string();
+            let error = check_complete(&path).unwrap_err().to_string();
             assert!(
                 error.contains(name) && error.contains("truncated"),
                 "{error}"
@@ -217,8 +217,8 @@ mod tests {
             // Data after the end is not damage.
             std::fs::write(&path, [&bytes[..], b"more"].concat()).unwrap();
             assert!(!has_both_ends(&path).unwrap(), "{name}");
-            check_whole(&path).unwrap();
+            check_complete(&path).unwrap();
         }
-        assert!(check_whole(&folder.path().join("none.png")).is_err());
+        assert!(check_complete(&folder.path().join("none.png")).is_err());
     }
 }

@@ -18,8 +18,8 @@ pub use depth_png::{read_depth_png, write_depth_png};
 pub use error::{Error, ImageProblem, Result};
 pub use exif_camera::{ExifCamera, exif_block_camera, exif_camera};
 pub use files::{
-    IMAGE_ENDINGS, check_whole, decode, decode_bytes, decode_rgb, image_size, is_image, load_rgb,
-    save_png,
+    IMAGE_ENDINGS, check_complete, decode, decode_bytes, decode_rgb, image_size, is_image,
+    load_rgb, save_png,
 };
 pub use image::RgbImage;
 pub use photo::{Photo, load_photo};

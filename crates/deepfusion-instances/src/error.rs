@@ -1,3 +1,4 @@
+use deepfusion_fs::FileError;
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
@@ -8,13 +9,8 @@ use crate::ShapeProblem;
 #[non_exhaustive]
 pub enum Error {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// Path of the model.
-        path: PathBuf,
-        /// Why it cannot be read.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The ONNX Runtime library is missing, or it refuses the model.
     #[error("{}: {source}", path.display())]
     Runtime {
@@ -49,7 +45,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::File { .. } => Some("give an ONNX file, as training frameworks export it".into()),
+            Self::File(error) => error.hint(),
             Self::Runtime { source, .. } => source.hint(),
             Self::Shape { reason, .. } => reason.hint(),
             Self::Class { known, .. } if known.is_empty() => {

@@ -16,6 +16,8 @@ mod mask;
 mod model;
 mod names;
 
+pub use deepfusion_fs::FileError;
+
 pub use candidate::{Candidate, suppress};
 pub use decode::decode;
 pub use error::{Error, Result};

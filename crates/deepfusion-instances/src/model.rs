@@ -1,5 +1,6 @@
 use std::path::{Path, PathBuf};
 
+use deepfusion_fs::FileError;
 use deepfusion_onnx::runtime::{ForeignModel, Tensor, TensorInfo};
 use image::RgbImage;
 
@@ -76,10 +77,7 @@ impl InstanceModel {
         threads: usize,
         limits: Limits,
     ) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|source| Error::File {
-            path: path.to_owned(),
-            source,
-        })?;
+        let bytes = std::fs::read(path).map_err(|source| FileError::new(path, source))?;
         let failed = |source| Error::Runtime {
             path: path.to_owned(),
             source,

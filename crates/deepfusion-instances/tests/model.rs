@@ -80,8 +80,11 @@ fn red_rectangles_are_found_with_their_pixels() {
 #[test]
 fn unusable_models_and_files_are_named() {
     let load = |path: PathBuf| InstanceModel::load(&path, None, 1, Limits::default()).unwrap_err();
-    let missing = load(fixture("missing"));
-    assert!(matches!(missing, Error::File { .. }) && missing.to_string().contains("missing.onnx"));
+    let missing = load(fixture("missing")).to_string();
+    assert!(
+        missing.ends_with("missing.onnx: no such file or folder"),
+        "{missing}"
+    );
     if !has_library() {
         return;
     }

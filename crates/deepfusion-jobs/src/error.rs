@@ -162,7 +162,7 @@ pub enum Error {
     },
     /// A file beside a network that cannot be read.
     #[error("{}", path.display())]
-    Kept {
+    NetworkFile {
         /// Path of the file, or the network's name.
         path: PathBuf,
         /// The parser's error.
@@ -170,7 +170,7 @@ pub enum Error {
     },
     /// Interval factors that cannot be read, or that are invalid.
     #[error("{}", path.display())]
-    KeptFactors {
+    IntervalFactors {
         /// Path of the file, or the network's name.
         path: PathBuf,
         /// What is wrong.
@@ -296,7 +296,7 @@ pub enum Error {
     /// A run, or a table of runs, that another process is writing.
     #[cfg(feature = "train")]
     #[error("{}: another process is already writing to this folder", folder.display())]
-    AtWork {
+    RunBusy {
         /// Path of the folder.
         folder: PathBuf,
     },

@@ -31,7 +31,7 @@ fn saved(run: &Path) -> Result<Option<(IntervalFactors, Option<usize>)>> {
     });
     match parsed {
         Ok((factors, step)) => Ok(Some((validated(factors, &path)?, step))),
-        Err(source) => Err(Error::Kept { path, source }),
+        Err(source) => Err(Error::NetworkFile { path, source }),
     }
 }
 
@@ -61,7 +61,7 @@ pub fn stale(run: &Path, step: usize) -> Result<Option<StaleCalibration>> {
 pub(crate) fn validated(factors: IntervalFactors, path: &Path) -> Result<IntervalFactors> {
     match factors.validate() {
         Ok(()) => Ok(factors),
-        Err(error) => Err(Error::KeptFactors {
+        Err(error) => Err(Error::IntervalFactors {
             path: path.to_owned(),
             source: Box::new(error),
         }),

@@ -114,7 +114,7 @@ impl ModelFacts for ModelSource {
                 let table = network.card.uncertainty.clone();
                 let factors: Result<Option<IntervalFactors>, _> =
                     table.map(toml::Table::try_into).transpose();
-                let factors = factors.map_err(|source| Error::Kept {
+                let factors = factors.map_err(|source| Error::NetworkFile {
                     path: named(),
                     source,
                 })?;

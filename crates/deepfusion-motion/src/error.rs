@@ -6,7 +6,8 @@ mod expected;
 pub use self::array::{ArrayProblem, TimesArray};
 pub use self::expected::{ExpectedLayout, ExpectedSetting};
 
-use deepfusion_hint::{Hint, system_hint};
+use deepfusion_fs::FileError;
+use deepfusion_hint::Hint;
 use std::path::{Path, PathBuf};
 
 /// Number of names that an error message lists.
@@ -75,13 +76,11 @@ pub enum Error {
         turning_s: f64,
     },
     /// A file could not be opened or read.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// Path of the file.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// An array of a comma2k19 segment does not exist or cannot be read.
+    #[error(transparent)]
+    ArrayFile(FileError),
     /// An array file does not match the recording's layout.
     #[error("{}: {problem}", path.display())]
     Array {
@@ -123,15 +122,6 @@ pub enum Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-impl Error {
-    pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            source,
-        }
-    }
-}
-
 fn of_file(path: Option<&Path>) -> String {
     path.map_or_else(String::new, |path| format!("{}: ", path.display()))
 }
@@ -163,10 +153,10 @@ impl Hint for Error {
             Self::YawSigns { .. } => {
                 "make the steering ratio negative if the angle grows to the right, or correct vehicle_from_imu"
             }
-            Self::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
+            Self::ArrayFile(FileError::NoSuchPath { .. }) => {
                 "give a comma2k19 segment, a folder with processed_log/CAN, processed_log/IMU and global_pose"
             }
-            Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
+            Self::File(error) | Self::ArrayFile(error) => return error.hint(),
             Self::Array { .. } => {
                 "download the recording again: the file is cut off, or from another data set"
             }

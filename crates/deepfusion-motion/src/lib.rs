@@ -56,6 +56,8 @@ mod vehicle_motion;
 mod vehicle_track;
 mod yaw_error;
 
+pub use deepfusion_fs::FileError;
+
 pub use bicycle::Bicycle;
 pub use error::{Error, ExpectedSetting, Result};
 pub use fusion::{

@@ -90,7 +90,14 @@ fn a_broken_file_names_the_line() {
     assert!(error.to_string().contains("broken.dbc"), "{error}");
     assert!(error.to_string().contains("25"), "the line: {error}");
     assert!(error.hint().is_some());
-    assert!(Dbc::open(Path::new("/nonexistent.dbc")).is_err());
+}
+
+#[test]
+fn a_missing_dbc_file_is_named() {
+    let error = Dbc::open(Path::new("nowhere.dbc")).unwrap_err();
+    assert_eq!(error.to_string(), "nowhere.dbc: no such file or folder");
+    let hint = error.hint().unwrap();
+    assert!(hint.contains("spelling"), "{hint}");
 }
 
 #[test]

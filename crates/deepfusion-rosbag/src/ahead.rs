@@ -74,8 +74,8 @@ impl Ahead {
         }
     }
 
-    /// The chunk, as soon as it is open.
-    pub(crate) fn redeem(&self, ticket: Ticket, info: &ChunkInfo) -> Outcome {
+    /// Waits until the chunk is open.
+    pub(crate) fn chunk(&self, ticket: Ticket, info: &ChunkInfo) -> Outcome {
         let outcome = match ticket {
             Ticket::Ahead(ticket) => ticket.recv().ok(),
             Ticket::OnDemand => None,

@@ -142,7 +142,7 @@ impl<'bag> Messages<'bag> {
         ticket: Ticket,
     ) -> std::result::Result<Option<OpenChunk>, Fault> {
         let file: &[u8] = self.bag.source();
-        let opened = self.ahead.redeem(ticket, info)?;
+        let opened = self.ahead.chunk(ticket, info)?;
         let wanted = |place: u32| self.wanted[place as usize];
         let places = self.bag.places();
         let mut entries = if info.scanned {

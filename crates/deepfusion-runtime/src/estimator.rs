@@ -133,7 +133,7 @@ impl DepthEstimator {
 
     /// Whether it predicts each pixel's uncertainty ([`Prediction::sigma`]).
     #[must_use]
-    pub fn knows_uncertainty(&self) -> bool {
+    pub fn predicts_uncertainty(&self) -> bool {
         self.config.depth_net.uncertainty && self.runner.predicts_uncertainty()
     }
 

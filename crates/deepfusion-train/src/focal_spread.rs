@@ -44,7 +44,7 @@ pub(crate) fn focal_spread(
     let loader = BatchLoader::validation(&config, of_blocks(samples));
     let mut blocks = Vec::new();
     while let Some(batch) = loader.next(&device) {
-        let batch = model.see(batch?);
+        let batch = model.with_learned_camera(batch?);
         let pass = model.forward(&batch);
         let [below, here, above] =
             [-STEP, 0.0, STEP].map(|step| loss_at(&model, (&batch, &pass), step));

@@ -124,7 +124,7 @@ impl Model {
 
     /// The batch with the learned camera's intrinsics; unchanged if the run learns no camera.
     #[must_use]
-    pub fn see(&self, batch: SnippetBatch) -> SnippetBatch {
+    pub fn with_learned_camera(&self, batch: SnippetBatch) -> SnippetBatch {
         match &self.focal {
             Some(focal) => self.refocused(&batch, focal.log_ratio.val()),
             None => batch,

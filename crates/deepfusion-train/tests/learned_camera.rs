@@ -209,7 +209,7 @@ fn gradients_of_the_focal_lengths_equal_those_of_the_definition() {
     let focal = model.focal.as_mut().unwrap();
     focal.log_ratio = focal.log_ratio.clone().map(|_| ratio.clone());
     assert!((focal.ratio() - 1.2).abs() < 1e-6);
-    let seen = model.see(pairs(&assumed, &[motion], &device));
+    let seen = model.with_learned_camera(pairs(&assumed, &[motion], &device));
     let sum = landed(&seen.intrinsics, &seen.inverse_intrinsics);
     close(
         number(sum.clone()),
@@ -249,7 +249,7 @@ fn the_photometric_error_in_bends_finds_the_focal_length() {
     let mut model = Model::new(&with_unit(config(1)), &device).unwrap();
     let mut adam = Adam::default();
     for _ in 0..60 {
-        let seen = model.see(batch.clone());
+        let seen = model.with_learned_camera(batch.clone());
         let view = synthesise(
             sources.clone(),
             depths.clone(),

@@ -4,7 +4,8 @@ mod content;
 
 pub use self::content::{ArrayProblem, ContentProblem, FolderKind};
 
-use deepfusion_hint::{Hint, system_hint};
+use deepfusion_fs::FileError;
+use deepfusion_hint::Hint;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 #[cfg(feature = "rerun")]
@@ -18,7 +19,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[non_exhaustive]
 pub enum Error {
     /// There is no file or folder at the path.
-    #[error("{}: no such folder", path.display())]
+    #[error("{}: no such file or folder", path.display())]
     NoSuchFolder {
         /// The path given.
         path: PathBuf,
@@ -71,13 +72,8 @@ pub enum Error {
         problem: EncodingProblem,
     },
     /// A file or folder cannot be read or written.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The content of a file does not match its name.
     #[error("{}: {problem}", path.display())]
     Content {
@@ -135,10 +131,7 @@ impl EncodingProblem {
 impl Error {
     /// An error of the system for a file.
     pub(crate) fn file(path: &std::path::Path, source: std::io::Error) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            source,
-        }
+        FileError::new(path, source).into()
     }
 
     /// A file whose content is wrong.
@@ -166,7 +159,7 @@ impl Hint for Error {
                 Some("give two folders of predictions, or two of training runs".into())
             }
             Self::NoFrames { .. } => Some("give a folder of predictions or of targets".into()),
-            Self::File { source, .. } => Some(system_hint(source.kind()).into()),
+            Self::File(error) => error.hint(),
             Self::Content { .. } | Self::Stopped { .. } => None,
             #[cfg(feature = "rerun")]
             Self::Encoding { .. } => None,

@@ -19,6 +19,8 @@ mod routes;
 mod server;
 mod training;
 
+pub use deepfusion_fs::FileError;
+
 pub use depth::{DepthCode, DepthFile};
 #[cfg(feature = "rerun")]
 pub use error::EncodingProblem;

@@ -380,11 +380,27 @@ fn a_folder_that_grows_is_followed() {
 }
 
 #[test]
+fn a_removed_folder_is_named() {
+    let folder = results(1);
+    let path = folder.path().to_owned();
+    let server = Running::start(&path, None);
+    assert_eq!(server.json("/api/runs/0/index")["failure"], Value::Null);
+    folder.close().unwrap();
+    let failure = format!("{}: no such file or folder", path.display());
+    assert_eq!(server.json("/api/runs/0/index")["failure"], failure);
+}
+
+#[test]
 fn folders_that_cannot_be_shown_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let of = |path: &std::path::Path| Folder::open(path).unwrap_err();
     let nowhere = of(&folder.path().join("nowhere"));
     assert!(matches!(nowhere, Error::NoSuchFolder { .. }) && nowhere.hint().is_some());
+    let nowhere = nowhere.to_string();
+    assert!(
+        nowhere.ends_with("nowhere: no such file or folder"),
+        "{nowhere}"
+    );
     let empty = of(folder.path());
     assert!(matches!(empty, Error::NothingToShow { .. }));
     assert!(

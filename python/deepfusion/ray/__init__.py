@@ -2,7 +2,7 @@
 several workers.
 
 Needs Ray (`pip install "deepfusion[ray]"`). Everything runs on the cluster that `ray.init()` has joined, or on this machine if it has
-joined none. Inputs and outputs are paths or URLs of any file system that fsspec knows: a folder that all machines see,
+joined none. Inputs and outputs are paths or URLs of any file system that fsspec knows: a folder that all machines share,
 `s3://bucket/folder` (with s3fs), `gs://…` (with gcsfs).
 """
 

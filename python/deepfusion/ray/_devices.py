@@ -15,7 +15,7 @@ def of_workers(device: str | None, gpus: float) -> str:
         device = "auto" if gpus else "cpu"
     _native.check_device(device)
     if gpus and device == "cpu":
-        raise ValueError('device: with "cpu", the GPU that each worker is given would be idle')
+        raise ValueError('device: expected a GPU backend or "auto", found "cpu": the GPU of each worker would be idle')
     if gpus and device == "auto" and deepfusion.devices() == ["cpu"]:
         # This raises an error about CUDA: the GPUs that Ray counts are mostly NVIDIA's.
         _native.check_device("cuda")
@@ -23,7 +23,7 @@ def of_workers(device: str | None, gpus: float) -> str:
 
 
 def numbered(device: str, index: int) -> str:
-    """The GPU with this index, of the backend that is asked for, or of the first that the package has."""
+    """The GPU with this index, of the requested backend, or for "auto" of the first that the package has."""
     if device == "auto":
         built = deepfusion.devices()
         device = next((one for one in ("cuda", "metal", "vulkan", "wgpu") if one in built), "cpu")

@@ -1,4 +1,4 @@
-"""What is known about a fleet's recordings, with one task per recording."""
+"""Checks and inspects a fleet's recordings, with one task per recording."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def doctor(
     """What `deepfusion doctor` finds in each recording: `recording`, `drives`, `frames`, `errors`, `warnings`, `findings` (their
     messages), `report` (the whole JSON) and `failed` (why it could not be checked, else None), in the order given.
 
-    Recordings can have any known layout. Those on other file systems are fetched by the machine that checks them, with the small
-    files beside them that belong to them: a KITTI date's `calib_*.txt` and `dataset.toml`, `drive.toml` of `drive.mp4`,
+    Recordings can have any known layout. Those on other file systems are fetched by the machine that checks them, together with the
+    small files beside them that they need: a KITTI date's `calib_*.txt` and `dataset.toml`, `drive.toml` of `drive.mp4`,
     `calibration.yaml`. Files that `dataset.toml` names elsewhere are not fetched: pass the folder then. At most `workers` recordings
     are checked at once (default: one per core of the cluster).
     """
@@ -43,7 +43,7 @@ def inspect(
     workers: int | None = None,
     storage_options: Mapping[str, Any] | None = None,
 ) -> list[Row]:
-    """What `deepfusion data inspect` says about each recording: `recording`, `layout`, `drives`, `frames`, `usable_pairs`, `distance_m`,
+    """What `deepfusion data inspect` reports about each recording: `recording`, `layout`, `drives`, `frames`, `usable_pairs`, `distance_m`,
     `duration_s`, `report` (the whole JSON) and `failed`. Otherwise like `doctor`."""
     return _each(_inspect, recordings, workers, storage_options)
 

@@ -1,4 +1,4 @@
-"""Bulk prediction on a cluster: every image once, whatever dies."""
+"""Bulk prediction on a cluster: every image exactly once, even if workers die."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class PredictSummary:
     done: int
     """Predicted by this job."""
     kept: int
-    """Already there, from an earlier job with the same network and options."""
+    """Already predicted, by an earlier job with the same network and options."""
     failed: list[tuple[str, str]]
     """Images that could not be predicted, and why. Repair them and start the same job again."""
     seconds: float
@@ -66,7 +66,7 @@ class PredictSummary:
 
 @dataclass(frozen=True)
 class _Job:
-    """What every worker needs to know."""
+    """The settings that every worker gets."""
 
     id: str
     model: str
@@ -119,13 +119,13 @@ class _Worker:
             try:
                 self.model = deepfusion.load(model, precision=job.precision, data_set=job.data_set, device=job.device)
             except deepfusion.DeepFusionError as error:
-                # Raised here, it would look like the death of a worker. It is kept for the caller instead.
+                # Raised here, it would look as if the worker had died. So it is returned to the caller.
                 self.refused = error
                 return
         # The backend that "auto" chose on this machine. Results of different backends differ in the last digits.
         opened = self.model.device.partition(":")[0]
         if job.gpus and opened == "cpu":
-            raise RuntimeError("the GPU of this worker cannot be used: no backend of this machine's package finds it")
+            raise RuntimeError("this worker's GPU cannot be used: no backend of the package on this machine finds it")
         if opened != "cpu":
             self.made_with["device"] = opened
         self.counted = metrics.Counter("deepfusion_images", "Images by outcome", ("outcome",))
@@ -142,16 +142,16 @@ class _Worker:
             try:
                 # Taken before the image is read, so that the next job notices a change in between.
                 mark = self.sources.mark(url)
-                there = self.there(url, name, mark)
-                if self.job.overwrite and there != ("done", ""):
-                    there = None
+                found = self.existing(url, name, mark)
+                if self.job.overwrite and found != ("done", ""):
+                    found = None
             except Exception as error:  # Any error of a file system is only this image's failure.
                 outcomes[i] = ("failed", _reason(error))
                 continue
-            if there is None:
+            if found is None:
                 todo.append((i, mark))
             else:
-                outcomes[i] = there
+                outcomes[i] = found
         with self.sources.local([rows[i][0] for i, _ in todo]) as paths:
             readable = [(i, mark, path) for (i, mark), path in zip(todo, paths) if isinstance(path, str)]
             outcomes |= {i: ("failed", _reason(path)) for (i, _), path in zip(todo, paths) if not isinstance(path, str)}
@@ -180,9 +180,9 @@ class _Worker:
             "why": [why for _, why in ordered],
         }
 
-    def there(self, url: str, name: str, mark: dict[str, Any]) -> tuple[str, str] | None:
-        """The state of an image in the folder: `done` if this job made it before a worker died, `kept` if an earlier job did, `failed` if it
-        belongs to something else, None if it is not complete."""
+    def existing(self, url: str, name: str, mark: dict[str, Any]) -> tuple[str, str] | None:
+        """The state of an image's outputs: `done` if this job wrote them before a worker died, `kept` if an earlier job did, `failed` if
+        they belong to something else, None if they are not complete."""
         written = self.folder.read(f"{name}.json")
         if written is None:
             return None
@@ -191,7 +191,7 @@ class _Worker:
             files = list(zip(sidecar["files"], sidecar["file_bytes"], sidecar["file_crc32"], strict=True))
             of, when, made_with = sidecar["image"], sidecar["image_file"], sidecar["made_with"]
         except (ValueError, KeyError, TypeError):
-            return "failed", f"{name}.json: not a sidecar of this function; overwrite=True replaces it"
+            return "failed", f"{name}.json: not written by this function; overwrite=True replaces it"
         if of != url:
             return "failed", f"{name}.json: belongs to another image, {of}; choose another output, or overwrite=True"
         if when != mark:
@@ -266,8 +266,8 @@ def _depth_png(depth: np.ndarray) -> bytes:
 
 
 def _check(model: str, precision: Precision, data_set: str | None, save: Sequence[str], post_process: PostProcess | None) -> None:
-    """Raises what every worker would: a wrong name, a run without weights. This machine may lack the workers' GPU and their processors'
-    precision."""
+    """Raises the errors that every worker would: a wrong name, a run without weights. This machine may lack the workers' GPU and their
+    processors' precision."""
     opened = deepfusion.load(model, data_set=data_set)
     if precision == "int8":
         # Checks the calibration, if this processor can compute in int8.
@@ -278,12 +278,12 @@ def _check(model: str, precision: Precision, data_set: str | None, save: Sequenc
                 raise
     grey = np.full((64, 64, 3), 128, np.uint8)
     camera = (64.0, 64.0, 31.5, 31.5)
-    unsaid = [kind for kind in save if kind in ("sigma", "confidence")]
+    uncertain = [kind for kind in save if kind in ("sigma", "confidence")]
     if post_process is not None:
         # Raises for a test-time augmentation that the network does not support.
         opened.predict(grey, camera, post_process=post_process)
-    if unsaid and opened.predict(grey, camera).sigma is None:
-        raise ValueError(f"save: the network does not predict uncertainty, so there is no {unsaid[0]} to save")
+    if uncertain and opened.predict(grey, camera).sigma is None:
+        raise ValueError(f"save: the network does not predict uncertainty, so there is no {uncertain[0]} to save")
 
 
 def predict(
@@ -307,8 +307,8 @@ def predict(
 ) -> PredictSummary:
     """Predicts the depth of many images on a cluster, each exactly once.
 
-    `paths` are images, folders (with everything below them, except `output` and earlier pictures of depth) and globs; `output` is a
-    folder. Both, and `model` unless it is an embedded network, are paths that all machines see, or URLs; `storage_options` are those
+    `paths` are images, folders (with everything below them, except `output` and earlier depth images) and globs; `output` is a
+    folder. Both, and `model` unless it is an embedded network, are paths that all machines share, or URLs; `storage_options` are those
     of their file system (fsspec's). The images come from one camera: `intrinsics` are fx, fy, cx, cy in its pixels, or the 3 x 3
     matrix; without them, each file's EXIF data is used, else the training camera's lens is assumed. `save` names what to write:
     "depth-png" (`NAME_depth.png`, KITTI's 16-bit PNG), "npy" (`NAME_depth.npy`, f32 metres), "sigma" and "confidence"

@@ -1,4 +1,4 @@
-"""Files on any file system that fsspec knows, written whole or not at all."""
+"""Files on any file system that fsspec knows, written completely or not at all."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Folder:
             return None
 
     def remove(self, name: str) -> None:
-        """Removes the file, if it is there."""
+        """Removes the file, if it exists."""
         try:
             self.fs.rm_file(self.path(name))
         except FileNotFoundError:
@@ -100,7 +100,7 @@ class Folder:
 
 
 class Sources:
-    """Inputs, read where they are."""
+    """Reads inputs from any file system."""
 
     def __init__(self, options: Mapping[str, Any]) -> None:
         self.options = options
@@ -172,7 +172,7 @@ class Sources:
 
 
 def _files(fs: Any, folder: str) -> list[dict[str, Any]]:
-    """The files of a folder; none if it may not be listed, which a file that is known by name does not need."""
+    """The files of a folder; none if it cannot be listed. Files with known names can be fetched without a listing."""
     if not _protocols(fs).isdisjoint({"http", "https"}):
         return []
     # A cached listing may be older than a repair of the recording.
@@ -218,9 +218,9 @@ def _holds_a_run(folder: str) -> bool:
 
 
 def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Every image that files, folders (with everything below them) and globs mean, once, with the name of its outputs: the path below
-    the folder or the glob's fixed part, without its ending. If two would have the same name, the second gets `-2`. Pictures of depth
-    in a folder or glob are left out if the sidecar of their image lists them: an earlier job made those."""
+    """Every image that files, folders (with everything below them) and globs name, once, with the name of its outputs: the path below
+    the folder or the glob's fixed part, without its ending. If two would have the same name, the second gets `-2`. Depth images
+    in a folder or glob are left out if the sidecar of their image lists them: an earlier job wrote those."""
     found: dict[str, str] = {}
     for url in given:
         fs, path = fsspec.core.url_to_fs(url, **options)
@@ -255,7 +255,7 @@ def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, 
 
 
 def _is_output(fs: Any, path: str) -> bool:
-    """Whether this is a picture of depth beside the sidecar of its image, which lists it: predicting its depth makes no sense."""
+    """Whether this is a depth image that the sidecar beside it lists as an output. Predicting its depth would make no sense."""
     folder, _, file = path.rpartition("/")
     if not file.endswith("_depth.png"):
         return False
@@ -266,7 +266,7 @@ def _is_output(fs: Any, path: str) -> bool:
 
 
 def weights_mark(model: str, options: Mapping[str, Any]) -> str | None:
-    """SHA-256 over the configuration and weights of a run (`network` says which); None for an embedded network, which the program's
+    """SHA-256 over the configuration and weights of the run that `network` found; None for an embedded network, which the program's
     version identifies."""
     import hashlib
 

@@ -50,18 +50,18 @@ def train(
     """Trains one network with several workers, each with `config`'s own `batch` and `accumulate`, as in `deepfusion.distributed`.
 
     Needs torch, whose process group adds the gradients: `backend` is "gloo", or "nccl" between GPUs, with a torch that has CUDA.
-    `out` is a folder that all machines see, new or empty; a run that is already there continues with its own configuration, or starts
+    `out` is a folder that all machines share, new or empty. A run that exists there continues with its own configuration, or starts
     again if it has no checkpoint yet. If a worker dies, Ray starts all of them again, at most `restarts` times, and they continue
     from the last checkpoint (`checkpoint_minutes`, `validate_every`).
 
     With `use_gpu`, each worker gets a GPU and trains on it: `device` is "auto" by default, or the backend ("cuda", "vulkan") without
-    a number, because Ray decides which of a machine's GPUs is whose. CUDA sees only the GPUs that Ray gives; the other backends count
+    a number, because Ray assigns a machine's GPUs. CUDA sees only the GPUs that Ray gives; the other backends count
     all of a machine's GPUs, so that two jobs on one machine would share them.
     """
     if backend not in ("gloo", "nccl"):
         raise ValueError(f'backend: expected "gloo" or "nccl", found {backend!r}')
     if backend == "nccl" and not use_gpu:
-        raise ValueError("backend: nccl works only on GPUs: give use_gpu=True, or gloo")
+        raise ValueError('backend: "nccl" works only on GPUs; set use_gpu=True, or use "gloo"')
     device = of_workers(device, int(use_gpu))
     if ":" in device:
         raise ValueError(f"device: expected {device.partition(':')[0]!r}, since Ray assigns the GPUs, found {device!r}")
@@ -126,8 +126,8 @@ def _learn(arguments: dict[str, Any]) -> None:
     else:
         config, data = arguments.pop("config"), arguments.pop("data")
         if leads:
-            # A run that died before its first checkpoint has nothing to lose. The best checkpoint is written before the last one: if it exists, it
-            # belongs to this job, which started without any.
+            # A run that died before its first checkpoint contains nothing to keep. The best checkpoint is written before the last
+            # one: if it exists, it belongs to this job, which started without any.
             _check_begun(out, _BEST)
             for file in list(out.iterdir()) if out.exists() else []:
                 if file.is_dir():
@@ -158,7 +158,7 @@ def _check_begun(out: Path, *more: str) -> None:
 
 
 def _is_begun(file: Path) -> bool:
-    """Whether a file was written by a run before its first checkpoint, and does not only have such a name."""
+    """Whether a file was written by a run before its first checkpoint, and does not just have such a name."""
     if not _BEGUN.fullmatch(file.name):
         return False
     if file.name == "config.toml":

@@ -35,7 +35,7 @@ class Trial:
     error: str | None
     """Why it failed; None if it did not."""
     row: str | None = None
-    """The row that it belongs to; None except from `ablate`. Its seed is among the settings."""
+    """Name of its row in `ablate`, otherwise None. Its seed is among the settings."""
 
 
 def tune(
@@ -62,7 +62,7 @@ def tune(
     (`ray.tune.loguniform(1e-5, 1e-3)`, `ray.tune.grid_search([...])`) or to fixed values; `trials` is the number of draws (for grids:
     of draws per grid point). `config` is a preset, or a dict over one. Each validation reports, so that a `scheduler`
     (`ASHAScheduler`) can stop trials that lag behind; `search` proposes values (Optuna's, for example). Each trial's run has a folder
-    of its own below `out`, which all machines see.
+    of its own below `out`, which all machines share.
 
     `validation` and `camera` are those of `deepfusion.train`. With `gpus_per_trial`, each trial gets a GPU, or a share of one, and
     trains on it: `device` is "auto" by default, or the backend ("cuda", "vulkan") without a number. With CUDA, it sees only the GPU

@@ -252,7 +252,7 @@ impl Dataset {
         Ok(image)
     }
 
-    /// Checks that a frame's image can be read, if it is a file of its own. Uses [`deepfusion_images::check_whole`], which takes hardly
+    /// Checks that a frame's image can be read, if it is a file of its own. Uses [`deepfusion_images::check_complete`], which takes hardly
     /// longer than opening the file.
     ///
     /// # Errors
@@ -262,7 +262,7 @@ impl Dataset {
     /// If there is no frame with that index.
     pub fn check_image(&self, frame: usize) -> Result<()> {
         match self.frames()[frame].image.file() {
-            Some(file) => Ok(deepfusion_images::check_whole(file)?),
+            Some(file) => Ok(deepfusion_images::check_complete(file)?),
             None => Ok(()),
         }
     }

@@ -271,7 +271,7 @@ fn nanoseconds(path: &Path) -> Result<Vec<i64>> {
 /// The numbers of an array with the shape N or N×1.
 fn column(path: &Path) -> Result<Vec<f64>> {
     comma::numbers(path).map_err(|error| match error {
-        deepfusion_motion::Error::File { path, source } => Error::file(&path, source),
+        deepfusion_motion::Error::ArrayFile(error) => Error::File(error),
         deepfusion_motion::Error::Array { path, problem } => {
             array_error(&path, SegmentProblem::Array(problem))
         }

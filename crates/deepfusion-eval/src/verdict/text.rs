@@ -57,14 +57,14 @@ impl fmt::Display for Evidence {
         let ranges = self.speed_ranges();
         if !ranges.is_empty() {
             let others = [
-                ("by the road", &self.road_speeds),
-                ("by PoseNet", &self.pose_speeds),
+                ("from the road", &self.road_speeds),
+                ("from PoseNet", &self.pose_speeds),
             ];
             let others: Vec<_> = others
                 .into_iter()
                 .filter(|(_, rows)| !rows.is_empty())
                 .collect();
-            write!(f, "\n  vehicle's speed   pairs  seen through the depth")?;
+            write!(f, "\n  vehicle's speed   pairs  from depth")?;
             others
                 .iter()
                 .try_for_each(|(name, _)| write!(f, "  {name}"))?;
@@ -78,7 +78,7 @@ impl fmt::Display for Evidence {
                 let pairs = pairs.map_or("–".to_owned(), |row| row.n.to_string());
                 let to = to_mps.map_or("  up".to_owned(), |to| format!("{to:>4}"));
                 let depth = of(&self.speeds);
-                let mut line = format!("  {from_mps:>2} to {to} m/s    {pairs:>5}  {depth:<22}");
+                let mut line = format!("  {from_mps:>2} to {to} m/s    {pairs:>5}  {depth:<10}");
                 for (name, rows) in &others {
                     line += &format!("  {:<width$}", of(rows), width = name.len());
                 }

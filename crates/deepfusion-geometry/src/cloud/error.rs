@@ -4,6 +4,7 @@ mod size;
 
 pub use self::size::SizeProblem;
 
+use deepfusion_fs::FileError;
 use deepfusion_hint::{Hint, system_hint};
 use std::path::PathBuf;
 
@@ -12,13 +13,8 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum Error {
     /// A file could not be opened, read or written.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// Path of the file.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// Reading or writing a stream failed.
     #[error("point cloud: {0}")]
     Stream(#[from] std::io::Error),
@@ -58,9 +54,8 @@ fn columns(point: usize) -> &'static str {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::File { source, .. } | Self::Stream(source) => {
-                Some(system_hint(source.kind()).into())
-            }
+            Self::File(error) => error.hint(),
+            Self::Stream(source) => Some(system_hint(source.kind()).into()),
             Self::Truncated { .. } => Some("copy or unpack the scan again: it is cut off".into()),
             Self::Ply(_) => Some(
                 "give a PLY file in binary_little_endian with float x, y, z in its vertex element"

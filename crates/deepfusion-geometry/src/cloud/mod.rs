@@ -9,5 +9,7 @@ mod pcd;
 mod ply;
 mod point_cloud;
 
+pub use deepfusion_fs::FileError;
+
 pub use error::{Error, PlyProblem, Result, SizeProblem};
 pub use point_cloud::PointCloud;

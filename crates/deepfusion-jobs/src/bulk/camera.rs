@@ -109,7 +109,7 @@ impl CameraSource {
     ///
     /// # Errors
     /// [`Error::Camera`] for the camera of images of another size.
-    pub fn see(&self, image: RgbImage, exif: Option<Intrinsics>) -> Result<PinholeImage> {
+    pub fn pinhole_image(&self, image: RgbImage, exif: Option<Intrinsics>) -> Result<PinholeImage> {
         if let Self::Lens(file) = self {
             let lens = file.lens_for(image.dimensions())?;
             return Ok(PinholeImage {

@@ -44,7 +44,7 @@ impl<'a> DepthJob<'a> {
         show_layers: Option<ShowLayers>,
         warn: Warn<'a>,
     ) -> Result<Self> {
-        if outputs.need_uncertainty() && !estimator.knows_uncertainty() {
+        if outputs.need_uncertainty() && !estimator.predicts_uncertainty() {
             return Err(Error::NoUncertainty);
         }
         if outputs.need_layers() && show_layers.is_none() {
@@ -124,7 +124,7 @@ impl<'a> DepthJob<'a> {
     ///
     /// # Errors
     /// The error of the network's engine.
-    pub fn see(
+    pub fn predict(
         &self,
         estimator: &mut DepthEstimator,
         prepared: &PreparedImage,
@@ -144,18 +144,18 @@ impl<'a> DepthJob<'a> {
         DepthWatch::new(self.scale.clone(), self.correct_scale)
     }
 
-    /// As [`Self::see`], for the next image of a sequence whose scale is watched; warns if it has changed.
+    /// As [`Self::predict`], for the next image of a sequence whose scale is watched; warns if it has changed.
     ///
     /// # Errors
-    /// As [`Self::see`].
-    pub(super) fn see_next(
+    /// As [`Self::predict`].
+    pub(super) fn predict_next(
         &self,
         estimator: &mut DepthEstimator,
         watch: &mut DepthWatch,
         input: &Input,
         (loaded, prepared): (&LoadedImage, &PreparedImage),
     ) -> Result<SeenDepth> {
-        let mut seen = self.see(estimator, prepared)?;
+        let mut seen = self.predict(estimator, prepared)?;
         let (image, camera) = (&loaded.image, loaded.camera);
         seen.scale = watch.observe(input, image, camera, &mut seen.prediction);
         self.warn_of_drift(&input.name, watch.first_drift());

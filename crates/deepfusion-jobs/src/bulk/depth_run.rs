@@ -31,7 +31,7 @@ pub fn predict<E: From<Error> + Send>(
     let mut watch = job.watch();
     let infer = |(i, loaded, prepared): (usize, LoadedImage, PreparedImage)| {
         let input = mine[todo[i]];
-        let seen = job.see_next(estimator, &mut watch, input, (&loaded, &prepared));
+        let seen = job.predict_next(estimator, &mut watch, input, (&loaded, &prepared));
         (loaded, seen)
     };
     let (to_disk, written) = queue();

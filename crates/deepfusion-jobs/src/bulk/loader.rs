@@ -65,7 +65,7 @@ impl ImageLoader {
             },
             None => {
                 let photo = load_photo(&input.path)?;
-                let seen = self.camera.see(photo.image, photo.intrinsics);
+                let seen = self.camera.pinhole_image(photo.image, photo.intrinsics);
                 seen.map_err(|source| Error::CameraOf {
                     path: input.path.clone(),
                     source: Box::new(source),
@@ -81,7 +81,7 @@ impl ImageLoader {
     /// [`Error::Camera`] for a camera that does not fit the image.
     pub fn load_live(&self, frame: LiveFrame) -> Result<(LoadedImage, PreparedImage)> {
         let mark = FileMark::of_arrival(frame.image.as_raw().len() as u64, frame.arrived_at);
-        let taken = self.camera.see(frame.image, None)?;
+        let taken = self.camera.pinhole_image(frame.image, None)?;
         Ok(self.prepare(mark, taken))
     }
 

@@ -141,7 +141,7 @@ fn outputs_are_not_inputs_in_any_folder() {
     let job = job.unwrap();
     let all = inputs(at, &["a"]);
     let (loaded, prepared) = job.load(&all[0]).unwrap();
-    let seen = job.see(&mut estimator, &prepared).unwrap();
+    let seen = job.predict(&mut estimator, &prepared).unwrap();
     job.writer.write(&all[0], &loaded, &seen).unwrap();
     let input = |file: &str| Input {
         path: out.join(file),
@@ -356,7 +356,7 @@ fn pictures_of_layers_need_a_function_that_shows_them() {
     let job = job(Some(nothing)).unwrap();
     let all = inputs(at, &["a"]);
     let (loaded, prepared) = job.load(&all[0]).unwrap();
-    let seen = job.see(&mut estimator, &prepared).unwrap();
+    let seen = job.predict(&mut estimator, &prepared).unwrap();
     let written = job.writer.write_outputs(&all[0], &loaded, &seen);
     assert!(matches!(written, Err(Error::NoLayers)));
     assert!(!out.join("a_features.png").exists());

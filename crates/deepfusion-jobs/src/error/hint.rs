@@ -119,7 +119,7 @@ impl Hint for Error {
                 count_of(*made, "step")
             )),
             #[cfg(feature = "train")]
-            Self::AtWork { .. } => {
+            Self::RunBusy { .. } => {
                 Some("wait for it to finish, stop it, or choose another folder".into())
             }
             #[cfg(feature = "train")]
@@ -174,10 +174,10 @@ impl Hint for Error {
             | Self::Picture(_)
             | Self::Shape(_)
             | Self::Npy(_)
-            | Self::Kept { .. }
+            | Self::NetworkFile { .. }
             | Self::NoTomlForm { .. }
             | Self::Toml(_) => None,
-            Self::KeptFactors { source, .. } => source.hint(),
+            Self::IntervalFactors { source, .. } => source.hint(),
             Self::Video(error) => error.hint(),
             Self::Images(error) => error.hint(),
             Self::Data(error) => error.hint(),

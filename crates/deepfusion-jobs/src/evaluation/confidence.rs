@@ -68,7 +68,7 @@ impl Confidence {
         match std::fs::read_to_string(&path) {
             Ok(text) => match toml::from_str(&text) {
                 Ok(confidence) => Ok(Some(confidence)),
-                Err(source) => Err(Error::Kept { path, source }),
+                Err(source) => Err(Error::NetworkFile { path, source }),
             },
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(e) => Err(deepfusion_data::Error::file(&path, e).into()),

@@ -74,8 +74,8 @@ impl<'a> MeasurementRequest<'a> {
             &self.protocol,
             baseline,
             &mut |dataset, frame| {
-                let seen = self.see(estimator, dataset, frame);
-                seen.map(|(_, prediction)| prediction)
+                let predicted = self.predict(estimator, dataset, frame);
+                predicted.map(|(_, prediction)| prediction)
             },
             progress,
         )?;
@@ -91,7 +91,7 @@ impl<'a> MeasurementRequest<'a> {
     }
 
     /// An image and its prediction, as requested.
-    fn see(
+    fn predict(
         &self,
         estimator: &mut DepthEstimator,
         dataset: &Dataset,
@@ -115,8 +115,8 @@ impl Measurement<'_> {
         calibrate: bool,
     ) -> Result<Option<(IntervalFactors, PathBuf)>> {
         let request = &self.request;
-        let knows = estimator.knows_uncertainty();
-        if !knows || request.truth.is_some() || request.post_process.is_some() {
+        let other_prediction = request.truth.is_some() || request.post_process.is_some();
+        if other_prediction || !estimator.predicts_uncertainty() {
             return Ok(None);
         }
         intervals::measure(
@@ -145,7 +145,7 @@ impl Measurement<'_> {
             ..
         } = self;
         shown_of_datasets(datasets, truth, evaluated, |dataset, frame| {
-            request.see(estimator, dataset, frame)
+            request.predict(estimator, dataset, frame)
         })
     }
 }

@@ -18,15 +18,15 @@ struct ImageToShow {
     camera: Option<Intrinsics>,
 }
 
-/// The chosen images of recordings, with their pictures; `see` returns an image of a data set and its prediction.
+/// The chosen images of recordings, with their pictures; `predict` returns an image of a data set and its prediction.
 ///
 /// # Errors
-/// An error of `see`; ground truth that cannot be read.
+/// An error of `predict`; ground truth that cannot be read.
 pub fn shown_of_datasets(
     datasets: &[Dataset],
     truth: &mut Truth,
     evaluated: &Evaluated,
-    mut see: impl FnMut(&Dataset, usize) -> Result<(RgbImage, Prediction)>,
+    mut predict: impl FnMut(&Dataset, usize) -> Result<(RgbImage, Prediction)>,
 ) -> Result<Vec<(ChosenImage, ShownFrame)>> {
     let names = ground_truth_names(datasets);
     let arrays = match truth {
@@ -38,7 +38,7 @@ pub fn shown_of_datasets(
         let place = dataset.selected().iter().position(|f| *f == frame);
         let name = place.and_then(|p| names[number].get(p));
         let array = name.and_then(|n| arrays.get(n)).copied();
-        let (image, prediction) = see(dataset, frame)?;
+        let (image, prediction) = predict(dataset, frame)?;
         let depth = truth.of(dataset, frame, array)?;
         Ok(depth.map(|depth| ImageToShow {
             image: Some(image),
@@ -70,11 +70,11 @@ pub fn shown_of_arrays(
 
 fn shown(
     evaluated: &Evaluated,
-    mut see: impl FnMut(ImageRef) -> Result<Option<ImageToShow>>,
+    mut read: impl FnMut(ImageRef) -> Result<Option<ImageToShow>>,
 ) -> Result<Vec<(ChosenImage, ShownFrame)>> {
     let mut frames = Vec::new();
     for chosen in chosen_images(&evaluated.images) {
-        let Some(to_show) = see(evaluated.places[chosen.image])? else {
+        let Some(to_show) = read(evaluated.places[chosen.image])? else {
             continue;
         };
         let truth = depth_map(&to_show.truth);

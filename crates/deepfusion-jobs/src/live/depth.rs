@@ -84,7 +84,7 @@ fn predict_frame(
     let arrived = frame.arrived;
     let mark = LiveMark::of_arrival(frame.arrived_at, frame.dropped);
     let (mut loaded, prepared) = job.load_live(&input, frame)?;
-    let seen = job.see(estimator, &prepared)?;
+    let seen = job.predict(estimator, &prepared)?;
     let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
     loaded.live = Some(LiveMark { latency_ms, ..mark });
     let frame = SeenFrame {

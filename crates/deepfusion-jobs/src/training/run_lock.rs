@@ -17,13 +17,13 @@ impl RunLock {
     /// Takes the lock of an existing folder. If it cannot be locked, that is a warning ([`tracing::warn`]).
     ///
     /// # Errors
-    /// [`Error::AtWork`] if another process holds it.
+    /// [`Error::RunBusy`] if another process holds it.
     pub fn take(folder: &Path) -> Result<Self> {
         let lock = match FolderLock::take(folder) {
             Ok(lock) => Some(lock),
             Err(TryLockError::WouldBlock) => {
                 let folder = folder.to_owned();
-                return Err(Error::AtWork { folder });
+                return Err(Error::RunBusy { folder });
             }
             Err(TryLockError::Error(error)) => {
                 tracing::warn!(
@@ -56,7 +56,7 @@ mod tests {
         assert_eq!(fs::read_dir(&run).unwrap().count(), 0);
         fs::rename(&run, &renamed).unwrap();
         let error = RunLock::take(&renamed).unwrap_err();
-        assert!(matches!(error, Error::AtWork { .. }), "{error}");
+        assert!(matches!(error, Error::RunBusy { .. }), "{error}");
         fs::create_dir(&run).unwrap();
         RunLock::take(&run).unwrap();
         drop(lock);

@@ -1,6 +1,7 @@
 use super::{BitLayout, ByteOrder, CanId, CanSignal, MultiplexCondition, Number};
 use crate::error::{Error, Result, SignalProblem};
 use can_dbc::{MessageId, MultiplexIndicator, NumericValue, SignalExtendedValueType};
+use deepfusion_fs::FileError;
 use std::path::Path;
 
 /// A DBC file: the description of the signals in CAN frames.
@@ -13,7 +14,7 @@ impl Dbc {
     /// # Errors
     /// [`Error::File`]; [`Error::Dbc`] with the line that cannot be read.
     pub fn open(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        let bytes = std::fs::read(path).map_err(|source| FileError::new(path, source))?;
         let text = String::from_utf8(bytes)
             .unwrap_or_else(|e| e.as_bytes().iter().map(|b| char::from(*b)).collect());
         Self::of_text(&text, Some(path))

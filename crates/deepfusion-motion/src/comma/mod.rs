@@ -42,7 +42,7 @@ impl CommaSegment {
     /// Reads a segment's folder. Steering, inertial unit and pose may be absent; the speed may not.
     ///
     /// # Errors
-    /// [`Error::File`] and [`Error::Array`], naming the array that is missing or does not match the layout.
+    /// [`Error::ArrayFile`] and [`Error::Array`], naming the array that is missing or does not match the layout.
     pub fn open(folder: &Path) -> Result<Self> {
         let (sensors, wheel_speeds_mps) = recorded(folder)?;
         let (reference, frame_times_s) = reference::read(&folder.join("global_pose"))?;
@@ -66,7 +66,7 @@ pub fn sensors(folder: &Path) -> Result<VehicleSensors> {
 /// Reads the numbers of an array with shape N or N×1, such as `processed_log/CAN/speed/t`.
 ///
 /// # Errors
-/// [`Error::File`]; [`Error::Array`] if it is not such an array.
+/// [`Error::ArrayFile`]; [`Error::Array`] if it is not such an array.
 pub fn numbers(path: &Path) -> Result<Vec<f64>> {
     Ok(Table::read(path, 1)?.values)
 }
@@ -212,7 +212,12 @@ mod tests {
     fn missing_and_mismatched_arrays_are_named() {
         let dir = tempfile::tempdir().unwrap();
         let error = CommaSegment::open(dir.path()).unwrap_err();
-        assert!(error.to_string().contains("CAN/speed/t"), "{error}");
+        assert!(
+            error
+                .to_string()
+                .ends_with("CAN/speed/t: no such file or folder"),
+            "{error}"
+        );
         assert!(error.hint().unwrap().contains("processed_log"));
 
         let speed = dir.path().join("processed_log/CAN/speed");

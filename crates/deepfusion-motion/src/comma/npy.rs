@@ -1,6 +1,7 @@
 //! Reads NumPy array files of one or two dimensions.
 
 use crate::error::{ArrayProblem, Error, Result};
+use deepfusion_fs::FileError;
 use deepfusion_geometry::NpyHeader;
 use ndarray::ArrayD;
 use ndarray_npy::ReadNpyExt;
@@ -16,7 +17,8 @@ pub(super) struct Table {
 impl Table {
     /// Reads an array of `float64` or `float32` with this many columns; a single column may be one-dimensional.
     pub(super) fn read(path: &Path, columns: usize) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        let failed = |source| Error::ArrayFile(FileError::new(path, source));
+        let bytes = std::fs::read(path).map_err(failed)?;
         Self::parse(&bytes, columns).map_err(|problem| Error::Array {
             path: path.to_owned(),
             problem,

@@ -108,9 +108,9 @@ fn add_speeds(page: HtmlReport, found: &Evidence) -> HtmlReport {
         return page;
     }
     let columns = [
-        ("speed seen through the depth / measured", &found.speeds),
-        ("by the road's motion / measured", &found.road_speeds),
-        ("by PoseNet / measured", &found.pose_speeds),
+        ("speed from depth / measured", &found.speeds),
+        ("from the road's motion / measured", &found.road_speeds),
+        ("from PoseNet / measured", &found.pose_speeds),
     ];
     let columns: Vec<_> = columns
         .into_iter()
@@ -165,10 +165,10 @@ mod tests {
         verdict.without_truth.speeds = speed_rows(&[(2.0, 0.0), (30.0, 0.0)]);
         verdict.without_truth.pose_speeds = speed_rows(&[(30.0, 0.0)]);
         let html = HtmlReport::new("t", "s").verdict(&verdict).to_html();
-        for text in ["0 to 3 m/s", "25 m/s and more", "by PoseNet / measured"] {
+        for text in ["0 to 3 m/s", "25 m/s and more", "from PoseNet / measured"] {
             assert!(html.contains(text), "no `{text}` in {html}");
         }
-        assert!(!html.contains("by the road"), "{html}");
+        assert!(!html.contains("from the road"), "{html}");
         assert!(html.contains("no certificate<"), "{html}");
     }
 }

@@ -55,7 +55,7 @@ impl DeviceCheck {
 
     /// What the device can be used for.
     #[must_use]
-    pub fn good_for(&self) -> DeviceUse {
+    pub fn usable_for(&self) -> DeviceUse {
         if !self.predicts() {
             return DeviceUse::Nothing;
         }
@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn optional_parts_with_wrong_operations_are_left_out() {
-        let of = |wrong: &[(NeededBy, bool)]| checks(wrong).good_for();
+        let of = |wrong: &[(NeededBy, bool)]| checks(wrong).usable_for();
         let without = |parts: &[NeededBy]| DeviceUse::TrainingWithout(parts.to_vec());
         assert_eq!(of(&[(NeededBy::Network, true)]), DeviceUse::Nothing);
         assert_eq!(of(&[(NeededBy::Network, false)]), DeviceUse::Prediction);

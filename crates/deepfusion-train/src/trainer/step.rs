@@ -50,7 +50,9 @@ impl Trainer {
         let scale = 1.0 / self.config.accumulate as f64;
         for _ in 0..self.config.accumulate {
             if let Some(loader) = &loaders.video {
-                let batch = self.model().see(next(|| loader.next(&self.device))?);
+                let batch = self
+                    .model()
+                    .with_learned_camera(next(|| loader.next(&self.device))?);
                 learned.images += batch.len() * (1 + batch.offsets.len());
                 let (pass, loss, mut numbers) = autocast(self.config.precision, || {
                     let pass = self.model().forward(&batch);

@@ -33,7 +33,7 @@ pub fn validation_loss(
             masks_active: false,
         };
         while let Some(batch) = loader.next(&device) {
-            let batch = model.see(batch?);
+            let batch = model.with_learned_camera(batch?);
             let pass = model.forward(&batch);
             let (_, mut unread) = model.loss_on_device(&pass, &batch, schedule);
             if model.pose_net.is_some() {

@@ -1,6 +1,6 @@
 // Requests to the server.
 
-/** A failure that the server explains. */
+/** An error that the server reports, with its hint. */
 export class Problem extends Error {
   constructor(message, hint, status) {
     super(message);

@@ -1,29 +1,29 @@
 // A frame's depth: the file's own numbers.
 
-/** Standard deviation over depth at which a pixel starts to fade, and at which it is gone. */
+/** Standard deviation over depth at which a pixel starts to fade, and at which it is invisible. */
 export const FADE = [0.2, 0.6];
 
 /** Opacity of a pixel: 1 where depth is certain, 0 where it is not. */
-export function sureness(depth, sigma) {
+export function opacity(depth, sigma) {
   if (!(depth > 0 && sigma >= 0)) return 0;
   return Math.min(1, Math.max(0, (FADE[1] - sigma / depth) / (FADE[1] - FADE[0])));
 }
 
-/** Depth as it was sent: "DFD1", width, height, code (0: u16 steps of 1/256 m; 1: f32 metres), values row by row. */
+/** Depth as the server sends it: "DFD1", width, height, code (0: u16 steps of 1/256 m; 1: f32 metres), values row by row. */
 export class Depth {
   constructor(buffer) {
     const head = new DataView(buffer);
-    if (buffer.byteLength < 16 || head.getUint32(0) !== 0x44464431) throw new Error('no depth was sent');
+    if (buffer.byteLength < 16 || head.getUint32(0) !== 0x44464431) throw new Error('the server did not send a depth map');
     this.width = head.getUint32(4, true);
     this.height = head.getUint32(8, true);
     const steps = head.getUint32(12, true) === 0;
     this.values = steps ? new Uint16Array(buffer, 16) : new Float32Array(buffer, 16);
     this.perMetre = steps ? 256 : 1;
-    if (this.values.length !== this.width * this.height) throw new Error('the depth that was sent is incomplete');
+    if (this.values.length !== this.width * this.height) throw new Error('the depth map from the server is truncated');
     this.bytes = buffer.byteLength;
   }
 
-  /** Metres at a pixel; 0 where there is none. */
+  /** Metres at a pixel; 0 if it has no depth. */
   at(x, y) {
     if (!(x >= 0 && y >= 0 && x < this.width && y < this.height)) return 0;
     const value = this.values[Math.floor(y) * this.width + Math.floor(x)] / this.perMetre;
@@ -56,9 +56,9 @@ export class Depth {
   fade(sigma, pixels, background) {
     const channels = new Uint8ClampedArray(pixels.buffer), rescale = this.perMetre / sigma.perMetre;
     for (let i = 0; i < this.values.length; i++) {
-      const kept = sureness(this.values[i], sigma.values[i] * rescale);
-      if (kept === 1) continue;
-      for (let c = 0; c < 3; c++) channels[4 * i + c] = background[c] + (channels[4 * i + c] - background[c]) * kept;
+      const alpha = opacity(this.values[i], sigma.values[i] * rescale);
+      if (alpha === 1) continue;
+      for (let c = 0; c < 3; c++) channels[4 * i + c] = background[c] + (channels[4 * i + c] - background[c]) * alpha;
     }
   }
 

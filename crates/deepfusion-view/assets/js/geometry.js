@@ -32,10 +32,10 @@ export function boxCorners(target) {
   return corners;
 }
 
-/** Pairs of corners that an edge joins; the first four are the bottom's, the last two mark the front. */
+/** Pairs of corners that an edge joins: four at the bottom, four at the top, four between them. */
 export const BOX_EDGES = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 
-/** The front's diagonals: where the target's length points. */
+/** The diagonals of the front, the side that the target's length points to. */
 export const FRONT_EDGES = [[0, 5], [1, 4]];
 
 /** The part of an edge in front of the plane z = near, as two pixels; null if all of it is behind. */

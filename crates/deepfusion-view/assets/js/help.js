@@ -30,9 +30,9 @@ export const KEYS = [
     [['L'], ['l'], 'list of targets', app => app.pane('list')],
     [['B'], ['b'], 'boxes', app => app.flip('boxes')],
     [['T'], ['t'], 'tracks', app => app.flip('tracks')],
-    [['N'], ['n'], 'numbers at the boxes', app => app.flip('labels')],
+    [['N'], ['n'], 'labels of the boxes', app => app.flip('labels')],
     [['I'], ['i'], 'colour by track, or by motion', app => app.flip('byTrack')],
-    [['G'], ['g'], 'rings on the ground', app => app.flip('ground')],
+    [['G'], ['g'], 'distance rings on the ground', app => app.flip('ground')],
     [['X'], ['x'], 'two runs: depth relative to the first', app => app.flip('difference')],
   ]],
   ['Page', [
@@ -57,8 +57,8 @@ export function help() {
   if (dialog.open) return dialog.close();
   const groups = KEYS.map(([name, keys]) => `<section><h3>${name}</h3>${keys.map(([shown, , what]) => `<div><span>${what}</span><span>${shown.map(k => `<kbd>${k.replace('<', '&lt;')}</kbd>`).join('')}</span></div>`).join('')}</section>`);
   dialog.innerHTML = `<button class="close" aria-label="Close">✕</button><h2>Keys</h2><div class="keys">${groups.join('')}</div>`
-    + '<p>Pictures: the pointer shows metres, the wheel zooms, dragging moves, a double click shows everything. Cloud: dragging rotates (with Shift or the right button, moves), the wheel zooms, a double click rotates about that point. A click on a box selects its track.</p>'
-    + '<p>Fingers: one shows metres or rotates the cloud, two zoom and move, a double tap shows everything.</p>';
+    + '<p>Pictures: the pointer shows the depth, the wheel zooms, dragging pans, a double click resets the zoom. Cloud: dragging rotates (with Shift or the right button, pans), the wheel zooms, a double click rotates about that point. A click on a box selects its track.</p>'
+    + '<p>Touch: one finger shows the depth or rotates the cloud, two zoom and pan. A double tap does what a double click does.</p>';
   dialog.querySelector('.close').onclick = () => dialog.close();
   dialog.onclick = e => { if (e.target === dialog) dialog.close(); };
   dialog.showModal();

@@ -1,4 +1,4 @@
-// The page's state, and which parts draw it.
+// The page's state, and the parts that draw it.
 
 import * as api from './api.js';
 import { CloudView, drawnBySoftware } from './cloud_view.js';
@@ -69,7 +69,7 @@ class App {
   /** The frame that run `r` shows now. */
   shown(r) { return this.shownFrames[r]; }
 
-  /** Whether run `r` has nothing to show beside the first. */
+  /** Whether run `r` has no frame to show beside the first run's. */
   missing(r) { return r > 0 && this.runs[r].version > 0 && this.place(r) === undefined; }
 
   ready(i) {
@@ -223,7 +223,7 @@ class App {
   shape() { return `${narrow() ? 'narrow' : 'wide'}-${this.runs.length}`; }
 
   restore() {
-    // Two clouds need the space.
+    // Two clouds need the list's space.
     if (this.runs.length > 1) this.options.list = false;
     for (const key of ['options', `panes-${this.shape()}`]) {
       try {

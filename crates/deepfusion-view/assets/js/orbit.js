@@ -75,7 +75,7 @@ export class Orbit {
     this.name = 'free';
   }
 
-  /** Where the eye is, in camera axes. Pitch 0 is level, a right angle looks down; yaw 0 looks along z. */
+  /** Position of the eye, in camera axes. At pitch 0 it looks horizontally, at 90° straight down; at yaw 0 along z. */
   eye() {
     const flat = Math.cos(this.pitch) * this.distance;
     return [

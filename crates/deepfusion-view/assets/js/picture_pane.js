@@ -1,4 +1,4 @@
-// A picture or a depth map, with boxes, a cross at the pointer's position in any pane, and a zoom that all pictures share.
+// A picture or a depth map, with boxes. A cross marks the pointer's position in every pane, and all pictures share one zoom.
 
 import { NOTHING, css, ofTarget, themeColour, ticks } from './colour.js';
 import { BOX_EDGES, FRONT_EDGES, boxCorners, project, projectEdge } from './geometry.js';
@@ -34,7 +34,7 @@ export class PicturePane {
     });
   }
 
-  /** The source that is painted: a bitmap, or the painted depth. */
+  /** Width and height of what is shown; null if nothing is known. */
   size(frame) {
     if (this.kind === 'depth' && frame?.depth) return [frame.depth.width, frame.depth.height];
     if (this.kind === 'picture' && frame?.bitmap) return [frame.bitmap.width, frame.bitmap.height];

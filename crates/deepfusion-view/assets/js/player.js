@@ -1,4 +1,4 @@
-// Playing: frames at their times, never one that is not loaded yet; the next ones are fetched ahead.
+// Plays frames at their recorded times, each only once it is loaded, and fetches the next ones ahead.
 
 const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const AT_ONCE = 4;

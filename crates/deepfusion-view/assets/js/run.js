@@ -1,4 +1,4 @@
-// One folder of results: its list of frames, and the frames that are loaded.
+// A folder of results: its list of frames, and the frames that are loaded.
 
 import * as api from './api.js';
 import { Cache } from './cache.js';
@@ -85,7 +85,7 @@ export class Run {
     const failed = error => {
       if (error instanceof api.Problem) return error;
       frame.lost = true;
-      return new api.Problem('the server does not answer', 'is `deepfusion view` still running?');
+      return new api.Problem('the server does not answer', 'check that `deepfusion view` is still running');
     };
     const attempt = promise => promise.catch(error => failed(error));
     const [meta, depth, sigma, blob] = await Promise.all([
@@ -129,7 +129,7 @@ export class Run {
     return frame;
   }
 
-  /** Targets of the frames up to `i`, the newest last, as far as loaded; missing ones are requested. */
+  /** Targets of the loaded frames up to `i`, the newest last. Those that are not loaded yet are requested. */
   history(i, count, arrived) {
     const found = [];
     for (let j = Math.max(0, i - count + 1); j <= i; j++) {

@@ -92,7 +92,7 @@ export function addCamera(lines, camera) {
   });
 }
 
-/** Boxes and their positions in a second. */
+/** Boxes, and arrows to their positions in one second. */
 export function addTargets(lines, frame, { byTrack, light, isChosen }) {
   for (const target of frame.targets) {
     const chosen = isChosen(target), corners = boxCorners(target);
@@ -135,7 +135,7 @@ export function addTracks(lines, frame, history, { byTrack, light, isChosen }) {
       if (!before) continue;
       const chosen = now && isChosen(now);
       const colour = chosen ? accent : now && !byTrack ? ofTarget(now, false, light) : ofTrack(id, light);
-      // A jump means another object under a reused number; it is drawn unchanged.
+      // A jump means that the number was reused for another object; it is drawn unchanged.
       lines.add(before, point, colour, (now ? 0.25 : 0.08) + 0.65 * fresh, chosen ? 2.6 : 1.6);
     }
   });

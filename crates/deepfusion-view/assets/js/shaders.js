@@ -1,6 +1,6 @@
 // Shader programs.
 
-/** Points straight from the depth texture: no vertex is ever uploaded. Pixel, depth, camera axes, screen. */
+/** Computes the points from the depth texture, so no vertices are uploaded: from pixel and depth to camera axes, then to the screen. */
 export const POINTS = {
   vertex: `#version 300 es
 precision highp float; precision highp sampler2D;
@@ -18,7 +18,7 @@ uniform bool fades;            // uncertain pixels fade into the background
 uniform vec2 fade;             // sigma / depth at which fading begins and ends
 uniform vec3 background;
 float at(ivec2 p) { return texelFetch(depth, clamp(p, ivec2(0), size - 1), 0).r; }
-float sureness(ivec2 p, float d) { return clamp((fade.y - texelFetch(sigma, p, 0).r / d) / (fade.y - fade.x), 0.0, 1.0); }
+float opacity(ivec2 p, float d) { return clamp((fade.y - texelFetch(sigma, p, 0).r / d) / (fade.y - fade.x), 0.0, 1.0); }
 bool shown(float d) { return d > 0.0 && d <= farthest; }
 // Difference in disparity from a neighbour; 0 if the neighbour has no depth.
 float fall(float d, ivec2 p) { float n = at(p); return n > 0.0 ? abs(1.0 / n - 1.0 / d) : 0.0; }
@@ -35,7 +35,7 @@ void main() {
     if (any(greaterThanEqual(first + stride, size))) return;
     float a = at(first), b = at(first + ivec2(stride, 0)), c = at(first + ivec2(0, stride)), e = at(first + stride);
     if (!(shown(a) && shown(b) && shown(c) && shown(e))) return;
-    // A patch is torn where its disparity falls faster than on any plane that passes the camera at 1 / tear metres.
+    // A patch is left out where its disparity changes faster than on any plane that passes the camera at 1 / tear metres.
     float low = min(min(1.0 / a, 1.0 / b), min(1.0 / c, 1.0 / e)), high = max(max(1.0 / a, 1.0 / b), max(1.0 / c, 1.0 / e));
     if ((high - low) * camera.x > 1.5 * float(stride) * tear) return;
     p = first + stride * ivec2(corner == 1 || corner >= 4 ? 1 : 0, corner == 2 || corner == 3 || corner == 5 ? 1 : 0);
@@ -52,7 +52,7 @@ void main() {
   }
   vec3 point = vec3((vec2(p) - camera.zw) / camera.xy * d, d);
   gl_Position = viewProjection * vec4(point, 1.0);
-  // As large as the distance to the point below, within limits, so that slanted surfaces are closed, too.
+  // As large as the distance to the point below, within limits, so that slanted surfaces have no gaps either.
   float patchSize = d / camera.x * float(stride);
   float below = at(p + ivec2(0, stride));
   float way = below > 0.0 ? clamp(0.75 * abs(below - d), patchSize, 4.0 * patchSize) : patchSize;
@@ -67,9 +67,9 @@ void main() {
     colour = texture(picture, (vec2(p) + 0.5) / vec2(size)).rgb;
   }
   if (fades) {
-    colour = mix(background, colour, sureness(p, d));
-    // A patch vanishes as a whole: the rest of an uncertain one would cover what is behind it.
-    if (sureness(whole, at(whole)) < 0.15) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+    colour = mix(background, colour, opacity(p, d));
+    // A patch is hidden completely: the remaining corners of an uncertain patch would cover what is behind it.
+    if (opacity(whole, at(whole)) < 0.15) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   }
 }`,
   fragment: `#version 300 es

@@ -40,7 +40,7 @@ export class Timeline {
     return Math.max(0, Math.min(n - 1, Math.floor(place * n)));
   }
 
-  /** Lanes that have numbers, as many as there is room for. */
+  /** Lanes that have numbers, as many as fit. */
   lanes(room) {
     const { series } = this.app.runs[0];
     if (this.lanesOf !== series) {
@@ -100,7 +100,7 @@ export class Timeline {
       ctx.strokeStyle = run ? css(themeColour('--warn')) : colours.accent;
       ctx.fillStyle = css(themeColour(run ? '--warn' : '--accent'), 0.13);
       ctx.lineWidth = 1.2;
-      // More frames than pixels: the lowest and the highest of each column of pixels.
+      // If there are more frames than pixels, each column of pixels shows its lowest and highest value.
       const step = Math.max(1, Math.ceil(n / (span * 1.5)));
       const path = new Path2D(), area = new Path2D();
       let open = null;
@@ -174,9 +174,9 @@ export class Timeline {
     const every = niceStep(n / Math.max(2, span / 90));
     const times = run.series.time_s ?? [], begin = times.find(t => t !== null);
     for (let i = 0; i < n; i += every) {
-      const said = times[i] !== null && times[i] !== undefined ? `${(times[i] - begin).toFixed(1)} s` : String(i + 1);
+      const label = times[i] !== null && times[i] !== undefined ? `${(times[i] - begin).toFixed(1)} s` : String(i + 1);
       ctx.textAlign = i === 0 ? 'left' : 'center';
-      ctx.fillText(said, i === 0 ? this.gutter : x(i), foot + 13);
+      ctx.fillText(label, i === 0 ? this.gutter : x(i), foot + 13);
     }
   }
 }

@@ -53,7 +53,7 @@ function drawChart({ column, canvas, readout }, logs) {
   const all = lines.flatMap(l => l.points);
   if (!all.length) return;
   const xs = all.map(p => p[0]), ys = all.map(p => p[1]).sort((a, b) => a - b);
-  // The first steps may be outliers: a hundredth at either end does not stretch the chart.
+  // The first steps may be outliers: the lowest 0.5 % and the highest 1 % of the values do not stretch the chart.
   let [low, high] = [ys[Math.floor(0.005 * (ys.length - 1))], ys[Math.ceil(0.99 * (ys.length - 1))]];
   if (!(high > low)) [low, high] = [low - 0.5, high + 0.5];
   const [first, last] = [xs.reduce((a, b) => Math.min(a, b)), xs.reduce((a, b) => Math.max(a, b))];

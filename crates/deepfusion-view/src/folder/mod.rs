@@ -12,6 +12,8 @@ mod summary;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use deepfusion_fs::FileError;
+
 pub(crate) use entry::{Entry, FrameFile};
 pub(crate) use frame::{Track, details_of, picture_of, targets_of};
 pub use problem::FrameProblem;
@@ -104,7 +106,10 @@ impl Folder {
     /// The list of frames for a client that has the `known` version of it, refreshed.
     pub(crate) fn index(&self, known: Option<u64>) -> Index {
         let mut listing = self.listing();
-        let failure = listing.refresh().err().map(|e| e.to_string());
+        let refreshed = listing.refresh();
+        let failure = refreshed
+            .err()
+            .map(|e| FileError::new(&self.path, e).to_string());
         listing.summarise();
         listing.index(known, failure)
     }

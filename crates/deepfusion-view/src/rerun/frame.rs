@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
+use deepfusion_fs::FileError;
 use deepfusion_geometry::Intrinsics;
 use deepfusion_records::FrameRecord;
 use re_log_types::{TimeInt, TimePoint, Timeline};
@@ -128,7 +129,7 @@ fn picture(
     match std::fs::read(&picture.path) {
         Ok(bytes) => Some(EncodedImage::new(bytes).with_media_type(picture.content_type)),
         Err(e) => {
-            let why = format!("{}: {e}", picture.path.display());
+            let why = FileError::new(&picture.path, e).to_string();
             add(problems, FrameProblem::Unreadable(why));
             None
         }

@@ -59,7 +59,7 @@ pub fn write_rerun(
     }
     let frames = folder.entries(0, usize::MAX);
     let mut report = RerunReport::default();
-    let failed = |e| Error::from(deepfusion_images::Error::file(path, e));
+    let failed = |e| Error::file(path, e);
     deepfusion_fs::write_atomically(path, failed, |out| {
         let recording = Recording::begin(out, &folder.name());
         let mut recording = recording.map_err(|e| e.of(path))?;

@@ -40,7 +40,7 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
         device: chosen.to_string(),
         wrong,
         of: found.operations.len(),
-        hint: hint(&found.good_for()),
+        hint: hint(&found.usable_for()),
     }
     .into())
 }
@@ -91,8 +91,8 @@ fn line(check: &OperationCheck) -> String {
 }
 
 /// What the device can still be used for.
-fn hint(good_for: &DeviceUse) -> String {
-    match good_for {
+fn hint(usable_for: &DeviceUse) -> String {
+    match usable_for {
         DeviceUse::Nothing => {
             "use `--device cpu`, another backend or a newer driver: depth from this device would be wrong".into()
         }

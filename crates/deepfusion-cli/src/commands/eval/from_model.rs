@@ -94,7 +94,7 @@ fn open(args: &EvalArgs) -> Result<EvalInputs> {
 
 /// Checks that a network's intervals can be calibrated and saved.
 fn check_calibration(model: &ModelSource, estimator: &DepthEstimator) -> Result<()> {
-    if !estimator.knows_uncertainty() {
+    if !estimator.predicts_uncertainty() {
         return Err(deepfusion_jobs::Error::NoUncertainty.into());
     }
     match model.folder() {

@@ -218,7 +218,7 @@ pub(super) fn job<'a>(
     recordings::warn_of_hfov(args.hfov);
     let (settings, out) = (settings(args), &args.out);
     // Checked first, so that no second network is opened for `show_layers` of a job that is refused.
-    if outputs.need_uncertainty() && !estimator.knows_uncertainty() {
+    if outputs.need_uncertainty() && !estimator.predicts_uncertainty() {
         return Err(Error::NoUncertainty.into());
     }
     let show_layers = if outputs.need_layers() {

@@ -55,7 +55,7 @@ impl Folders {
     /// The lock of the training's folder; `None` if it does not exist.
     ///
     /// # Errors
-    /// [`Error::AtWork`] if another process is training there.
+    /// [`Error::RunBusy`] if another process is training there.
     pub(super) fn lock(&self) -> Result<Option<RunLock>> {
         if self.work.is_dir() {
             RunLock::take(&self.work).map(Some)

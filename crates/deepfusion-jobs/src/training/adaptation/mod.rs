@@ -198,7 +198,7 @@ impl Adaptation {
     /// The trainer; it continues an interrupted adaptation with the same settings.
     ///
     /// # Errors
-    /// [`Error::OtherSettings`] if an interrupted adaptation had other settings; [`Error::AtWork`] if another process is training there; as
+    /// [`Error::OtherSettings`] if an interrupted adaptation had other settings; [`Error::RunBusy`] if another process is training there; as
     /// [`open_samples`]; errors of the trainer.
     pub fn trainer(
         &self,
