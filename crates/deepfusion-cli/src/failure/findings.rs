@@ -124,6 +124,9 @@ mod tests {
             assert!(!reason.hint().contains(" --"), "{reason}");
             assert!(hint(&reason).unwrap().contains("--"), "{reason}");
         }
-        assert_eq!(hint(&FindingReason::Words("log a drive".into())), None);
+        assert_eq!(
+            hint(&FindingReason::Words("record while driving".into())),
+            None
+        );
     }
 }
