@@ -40,6 +40,10 @@ pub(crate) enum CliError {
     #[cfg(not(feature = "rerun"))]
     #[error("this build writes no files for the rerun viewer")]
     NoRerun,
+    /// A table whose rows cannot be measured.
+    #[cfg(feature = "train")]
+    #[error("no frame to measure the rows on has ground truth")]
+    NoTruth,
     /// A term to be both switched on and left out.
     #[cfg(feature = "train")]
     #[error("--with {term} and --without {term} contradict each other")]
@@ -356,6 +360,8 @@ impl Reportable for CliError {
             }
             #[cfg(feature = "train")]
             Self::OnAndOff { .. } => Some("keep one of them".into()),
+            #[cfg(feature = "train")]
+            Self::NoTruth => Some("give drives with scans or depth images: --eval-data PATH".into()),
             Self::NotOnClock { .. } => Some("give seconds, a time of day or a date, as in the log".into()),
             Self::OutOfPlace { is_log: true, .. } => Some(
                 "leave it out: a log by itself takes --time, --speed, --unit and --dbc, and deepfusion data import makes a recording of it".into(),

@@ -41,8 +41,8 @@ impl FromStr for Size {
 
 /// A checkerboard's inner corners, written `9x6`.
 pub(super) fn board(text: &str) -> Result<Size, String> {
-    text.parse()
-        .map_err(|_: String| "expected inner corners as WIDTHxHEIGHT, such as 9x6".into())
+    text.parse::<Size>()
+        .map_err(|_| "expected inner corners as WIDTHxHEIGHT, such as 9x6".into())
 }
 
 /// A camera's numbers as given on the command line, in pixels of the input image.
