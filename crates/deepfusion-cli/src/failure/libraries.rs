@@ -126,7 +126,10 @@ impl Reportable for deepfusion_doctor::NoCameraAhead {
         let hint = self.hint();
         match self {
             // These hints end with the offset to give.
-            Self::NotFound { .. } | Self::Weak { .. } | Self::Unsure { .. } => hint.map(|hint| {
+            Self::NoSpeeds { .. }
+            | Self::NotFound { .. }
+            | Self::Weak { .. }
+            | Self::Unsure { .. } => hint.map(|hint| {
                 format!("{hint}: --clock-offset MS (without it the clocks are taken to agree)")
             }),
             _ => hint,
