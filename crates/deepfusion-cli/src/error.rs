@@ -40,6 +40,17 @@ pub(crate) enum CliError {
     #[cfg(not(feature = "rerun"))]
     #[error("this build writes no files for the rerun viewer")]
     NoRerun,
+    /// A table whose rows cannot be measured.
+    #[cfg(feature = "train")]
+    #[error("no frame to measure the rows on has ground truth")]
+    NoTruth,
+    /// A term to be both switched on and left out.
+    #[cfg(feature = "train")]
+    #[error("--with {term} and --without {term} contradict each other")]
+    OnAndOff {
+        /// The term.
+        term: String,
+    },
     /// A text that is not a time on the log's clock.
     #[error("--start {word}: not a time on the log's clock")]
     NotOnClock {
@@ -105,7 +116,7 @@ pub(crate) enum CliError {
         model: String,
     },
     /// A file where a run's folder is needed.
-    #[error("{}: expected a run's folder for the pictures, found a file", path.display())]
+    #[error("{}: a file, expected a run's folder for the pictures", path.display())]
     NoModel {
         /// The file.
         path: PathBuf,
@@ -171,7 +182,7 @@ pub(crate) enum CliError {
         path: PathBuf,
     },
     /// A file where the folder for the outputs should be.
-    #[error("{}: expected a folder for the outputs, found a file", path.display())]
+    #[error("{}: a file, expected a folder for the outputs", path.display())]
     NotAFolder {
         /// The file.
         path: PathBuf,
@@ -273,6 +284,8 @@ impl Reportable for CliError {
             | Self::OutOfPlace { .. }
             | Self::OtherLayout { .. }
             | Self::Varied { .. } => Exit::WrongArguments,
+            #[cfg(feature = "train")]
+            Self::OnAndOff { .. } => Exit::WrongArguments,
             _ => Exit::Failed,
         }
     }
@@ -345,6 +358,10 @@ impl Reportable for CliError {
             Self::VideoShard => {
                 Some("save side-by-side in the shards, then run once more with --save video and without --shard".into())
             }
+            #[cfg(feature = "train")]
+            Self::OnAndOff { .. } => Some("keep one of them".into()),
+            #[cfg(feature = "train")]
+            Self::NoTruth => Some("give drives with scans or depth images: --eval-data PATH".into()),
             Self::NotOnClock { .. } => Some("give seconds, a time of day or a date, as in the log".into()),
             Self::OutOfPlace { is_log: true, .. } => Some(
                 "leave it out: a log by itself takes --time, --speed, --unit and --dbc, and deepfusion data import makes a recording of it".into(),

@@ -119,6 +119,10 @@ fn an_impossible_table_is_refused() {
             "ablate --data sim --budget 1 --eval-data gone --out b",
             &["gone"],
         ),
+        (
+            "ablate --data sim --budget 1 --rows none --out f",
+            &["has ground truth", "--eval-data"],
+        ),
     ] {
         let run = run(at, args);
         assert_eq!(run.code, 1, "{args}: {}", run.stderr);

@@ -98,7 +98,10 @@ fn runs_are_reported_kept_and_compared() {
     );
 
     // Side by side.
-    fails(at, "compare a b", &["b: has no evaluation"]);
+    let evaluate = "hint: evaluate it first: deepfusion eval --model b";
+    fails(at, "compare a b", &["b: has no evaluation", evaluate]);
+    fs::create_dir(at.join("no-run")).unwrap();
+    fails(at, "compare no-run", &["hint: give a run's folder"]);
     ok(at, "eval --model b --data sim");
     fs::write(at.join("printed.json"), &printed).unwrap();
     let text = ok(at, "compare a b printed.json");

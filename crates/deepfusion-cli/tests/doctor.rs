@@ -203,7 +203,9 @@ fn a_drive_that_cannot_train_does_not_fail_its_folder() {
     let alone = run(at, &format!("doctor all/2026_01_01/{single}"));
     assert_eq!(alone.code, 1);
     assert!(
-        alone.stdout.contains("no pair of frames can train"),
+        alone
+            .stdout
+            .contains("no pair of frames can be used for training"),
         "{}",
         alone.stdout
     );

@@ -264,7 +264,7 @@ fn bad_arrays_end_in_an_error_with_the_array_and_a_hint() {
     for (args, expected) in [
         (
             "eval --pred gt.npz --pred-kind depth --gt gt.npz --cap 1 --min 2",
-            "above the minimum depth",
+            "--cap is 1 m, expected more than --min",
         ),
         (
             "eval --pred nan.npz --pred-kind depth --gt gt.npz",

@@ -70,6 +70,11 @@ fn a_log_beside_its_images_is_a_drive() {
         "{printed}"
     );
     assert!(printed.contains("hfov_deg = 70"), "{printed}");
+    fs::create_dir(at.join("empty")).unwrap();
+    let no_images = "data import torque.csv --zone +01:00 --images empty --hfov 70 --out no-images";
+    let printed = ok(at, no_images).stderr;
+    assert!(printed.contains("still to do"), "{printed}");
+    assert!(printed.contains("no image (.png"), "{printed}");
     fs::copy(at.join("frames.csv"), at.join("drive/frames.csv")).unwrap();
     let imported = json(at, "data inspect drive --json");
     let mean = |inspection: &Value| inspection["speed_mps"]["mean"].as_f64().unwrap();

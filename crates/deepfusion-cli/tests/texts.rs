@@ -142,6 +142,11 @@ fn wrong_arguments_end_with_2_and_suggest_the_near_one() {
             ],
             "fx,fy,cx,cy",
         ),
+        (
+            &["predict", "i.png", "--out", "o", "--max-depth", "-1"],
+            "above 0",
+        ),
+        (&["calibrate", "b.mp4", "--board", "9"], "such as 9x6"),
         (&["data", "inspect", "d", "--hfov", "180"], "below 170"),
         (
             &[

@@ -221,6 +221,13 @@ fn errors_of_start_or_folder_come_before_the_recordings_are_read() {
     fs::write(at.join("taken/file"), "x").unwrap();
     let train = "train --data no-drive";
     fails(at, &format!("{train} --init no-weights"), &["no-weights"]);
+    let both = run(at, &format!("{train} --with hce --without affine,hce"));
+    assert_eq!(both.code, 2, "{}", both.stderr);
+    assert!(
+        both.stderr.contains("--with hce and --without hce"),
+        "{}",
+        both.stderr
+    );
     fails(
         at,
         &format!("{train} --out taken"),

@@ -226,6 +226,17 @@ pub enum Error {
         #[source]
         problem: TableProblem,
     },
+    /// A row of a table cannot be read.
+    #[error("{}:{line}: {problem}", path.display())]
+    Row {
+        /// Path of the file.
+        path: PathBuf,
+        /// The line, counted from 1, including the header.
+        line: u64,
+        /// What is wrong with the row.
+        #[source]
+        problem: TableProblem,
+    },
     /// A log from a vehicle, a GPS receiver or an app cannot be used.
     #[error(transparent)]
     Log(#[from] deepfusion_logs::Error),
@@ -241,7 +252,7 @@ pub enum Error {
     /// The times of the speeds and those of the frames do not overlap.
     #[error(
         "{}: its times ({} to {} s) do not overlap with the frames' ({} to {} s)",
-        path.display(), times_s.0, times_s.1, frames_s.0, frames_s.1
+        path.display(), in_ms(times_s.0), in_ms(times_s.1), in_ms(frames_s.0), in_ms(frames_s.1)
     )]
     Clocks {
         /// Path of the file of speeds.
@@ -291,7 +302,7 @@ pub enum Error {
         choice: Option<NamedTopic>,
     },
     /// A topic was named for a recording that has no topics.
-    #[error("{}: {topic}: {layout} has no topics", path.display())]
+    #[error("{}: {topic}: recordings of this layout ({layout}) have no topics", path.display())]
     NoTopics {
         /// Path of the recording.
         path: PathBuf,
@@ -301,7 +312,7 @@ pub enum Error {
         topic: NamedTopic,
     },
     /// The recording is not a bag, but a bag is required.
-    #[error("{}: not a ROS bag, but of the layout {layout}", path.display())]
+    #[error("{}: {layout}, expected a ROS bag", path.display())]
     NotABag {
         /// Path of the recording.
         path: PathBuf,
@@ -535,8 +546,8 @@ pub enum Error {
         #[source]
         problem: ArrayProblem,
     },
-    /// A recording has no scan to compute ground truth from.
-    #[error("{}: {}, but no velodyne scan for any", path.display(), count_of(*frames, "frame"))]
+    /// A recording has no measured depth to compute ground truth from.
+    #[error("{}: {}, but no scan or depth image for any", path.display(), count_of(*frames, "frame"))]
     NoScans {
         /// Path of the recording.
         path: PathBuf,
@@ -624,6 +635,11 @@ fn none_is(entries: usize) -> String {
     }
 }
 
+/// Seconds, rounded to milliseconds.
+fn in_ms(seconds: f64) -> f64 {
+    (seconds * 1e3).round() / 1e3
+}
+
 /// The requested distance between the frames of a step, if any.
 fn a_step(frame_distance_m: f64) -> String {
     if frame_distance_m > 0.0 {
@@ -658,6 +674,19 @@ mod tests {
                 .any(|word| word == format!(".{ending}"));
             assert!(named, "{ending}");
         }
+    }
+
+    #[test]
+    fn clocks_are_shown_in_milliseconds() {
+        let error = Error::Clocks {
+            path: "speed.csv".into(),
+            times_s: (1_000.000_000_000_000_1, 1009.32),
+            frames_s: (0.0, 4.0404),
+        };
+        assert_eq!(
+            error.to_string(),
+            "speed.csv: its times (1000 to 1009.32 s) do not overlap with the frames' (0 to 4.04 s)"
+        );
     }
 
     #[test]

@@ -322,7 +322,7 @@ fn errors_name_broken_parts() {
     fs::write(&packet, common::packet(f64::NAN, 0.0)).unwrap();
     let text = refusal(&drive);
     assert!(
-        text.contains("0000000002.txt: vf (value 9 of 30): is NaN"),
+        text.contains("0000000002.txt: vf (value 9 of 30): NaN"),
         "{text}"
     );
     fs::write(&packet, good).unwrap();

@@ -260,7 +260,7 @@ fn images_without_speeds_are_opened_but_cannot_be_trained_on() {
     assert_eq!(dataset.frames().len(), 4);
     assert_eq!(dataset.load_image(2).unwrap(), picture(2));
     let error = dataset.snippets(&[1], 0.5).unwrap_err();
-    assert!(error.to_string().contains("it has no speeds"), "{error}");
+    assert!(error.to_string().contains(": no speeds"), "{error}");
     assert!(error.hint().unwrap().contains("speed.csv"), "{error}");
     fs::write(
         root.path().join("speed.csv"),

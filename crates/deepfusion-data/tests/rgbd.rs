@@ -66,7 +66,7 @@ fn depth_and_poses_are_read_and_lost_poses_are_left_out() {
     );
     assert!((paths[1].world_from_cam[1].translation().x - 0.4).abs() < 1e-12);
     let error = dataset.snippets(&[1], 0.5).unwrap_err();
-    assert!(error.to_string().contains("it has no speeds"), "{error}");
+    assert!(error.to_string().contains(": no speeds"), "{error}");
     assert!(
         error.hint().unwrap().contains("evaluate and predict"),
         "{error}"

@@ -262,6 +262,8 @@ fn files_that_are_not_videos_are_errors() {
         error.to_string().contains("the folder has 2 videos"),
         "{error}"
     );
+    let hint = error.hint().unwrap();
+    assert!(hint.contains("set video = "), "{hint}");
 }
 
 #[test]

@@ -167,7 +167,7 @@ impl Hint for Error {
             Self::ArrayFile { reason, .. } => reason.hint().map(str::to_owned),
             Self::UnmatchedNames { instead, .. } => Some(match instead {
                 Some(name) => format!(
-                    "arrays are matched by name, but this file has names like `{name}`; use the same names in both files"
+                    "arrays are matched by name: use the same names in both files (this one has names like `{name}`)"
                 ),
                 None => "arrays are matched by name; write both files from the same list of frames".into(),
             }),

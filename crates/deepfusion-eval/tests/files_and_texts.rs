@@ -188,6 +188,16 @@ fn an_array_that_claims_too_much_is_an_error() {
 }
 
 #[test]
+fn a_file_without_arrays_is_an_error_with_a_hint() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("none.npz");
+    npz(&path, &[]);
+    let error = ArraySet::open(&path).unwrap_err();
+    assert!(error.to_string().ends_with("has no arrays"), "{error}");
+    assert!(error.hint().unwrap().contains("numpy.savez"), "{error}");
+}
+
+#[test]
 fn axes_of_length_one_are_dropped() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("batch.npz");

@@ -54,7 +54,7 @@ impl ImageProblem {
                 "copy the file again, or, to leave the frame out, delete it with its line in frames.csv or timestamps.txt"
             }
             Self::NotAnnotatedDepth => "give depth as a 16-bit grey PNG, in steps of 1/256 m",
-            _ => "give a PNG or JPEG image",
+            _ => "replace it with a PNG or JPEG image, or leave it out",
         }
     }
 }

@@ -35,7 +35,7 @@ pub enum Error {
         problem: BytesProblem,
     },
     /// The column of times or speeds is missing or not known.
-    #[error("{}: {problem}; its columns: {}", path.display(), columns.join(", "))]
+    #[error("{}: {problem}; {}", path.display(), in_words(columns))]
     Column {
         /// Path of the file.
         path: PathBuf,
@@ -93,6 +93,15 @@ pub enum Error {
     Motion(#[from] deepfusion_motion::Error),
 }
 
+/// The headers of a table's columns, as part of a sentence.
+fn in_words(columns: &[String]) -> String {
+    if columns.iter().all(String::is_empty) {
+        "the file has no header".into()
+    } else {
+        format!("its columns: {}", columns.join(", "))
+    }
+}
+
 /// The part of a line, before a problem; nothing for the whole line.
 fn place(field: &LineField) -> String {
     match field {
@@ -123,8 +132,8 @@ pub enum ColumnProblem {
     /// No column looks like a time.
     #[error("no column looks like a time")]
     NoTime,
-    /// No column looks like a speed, and there are no positions.
-    #[error("no column looks like a speed, and none like latitude and longitude")]
+    /// No column of numbers looks like a speed, and there are no positions.
+    #[error("no column of numbers looks like a speed, and none like latitude and longitude")]
     NoSpeed,
     /// The speed's unit is not known.
     #[error("the unit of the speed in column '{0}' is not known")]

@@ -255,7 +255,10 @@ fn an_unknown_table_needs_the_names_of_its_columns() {
         ..ReadOptions::default()
     };
     let error = read(&path, &options).unwrap_err().to_string();
-    assert!(error.contains("no column looks like a speed"), "{error}");
+    assert!(
+        error.contains("no column of numbers looks like a speed"),
+        "{error}"
+    );
     options.speed = Some("Fahrt".into());
     let error = read(&path, &options).unwrap_err().to_string();
     assert!(
@@ -269,6 +272,17 @@ fn an_unknown_table_needs_the_names_of_its_columns() {
     options.speed = Some("Tempo".into());
     let error = read(&path, &options).unwrap_err().to_string();
     assert!(error.contains("no column 'Tempo'"), "{error}");
+}
+
+#[test]
+fn an_empty_file_is_not_said_to_have_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("empty.csv");
+    std::fs::write(&path, "").unwrap();
+    let error = read(&path, &ReadOptions::default())
+        .unwrap_err()
+        .to_string();
+    assert!(error.ends_with("the file has no header"), "{error}");
 }
 
 /// Speeds in UTC, and turns on a local clock.

@@ -1,6 +1,7 @@
 //! What can go wrong with a configuration, or with a run on disk.
 
 use deepfusion_hint::{Hint, count_of, system_hint};
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use crate::NetworkError;
@@ -56,6 +57,12 @@ pub enum Error {
         /// The parser's message, with the line.
         #[source]
         reason: TomlProblem,
+    },
+    /// A file to be read that does not exist.
+    #[error("{path}: no such file or folder")]
+    NoSuchFile {
+        /// Path of the file.
+        path: PathBuf,
     },
     /// A file that cannot be read or written.
     #[error("{path}: cannot {action}: {source}")]
@@ -148,8 +155,12 @@ impl Error {
     /// A file that cannot be read or written; `action` is "read" or "write".
     #[must_use]
     pub fn io(path: &std::path::Path, action: &'static str, source: std::io::Error) -> Self {
+        let path = path.to_owned();
+        if action == "read" && source.kind() == ErrorKind::NotFound {
+            return Self::NoSuchFile { path };
+        }
         Self::Io {
-            path: path.to_owned(),
+            path,
             action,
             source,
         }
@@ -183,11 +194,12 @@ impl Hint for Error {
                 )
                 .into(),
             ),
+            Self::NoSuchFile { .. } => Some(system_hint(ErrorKind::NotFound).into()),
             Self::Io { source, action, .. } => match source.kind() {
-                std::io::ErrorKind::StorageFull => {
+                ErrorKind::StorageFull => {
                     Some("free some disk space; an existing file is unchanged".into())
                 }
-                std::io::ErrorKind::PermissionDenied => {
+                ErrorKind::PermissionDenied => {
                     Some(format!("check that you have permission to {action} there"))
                 }
                 kind => Some(system_hint(kind).into()),
@@ -285,11 +297,26 @@ pub enum SettingProblem {
         nearest: Vec<String>,
     },
     /// A value that the key cannot have: the parser's message.
-    #[error("{}", .0.to_string().trim().replace('\n', " "))]
+    #[error("{}", of_value(.0))]
     Value(Box<toml::de::Error>),
     /// A key that the caller sets itself; its reason.
     #[error("{0}")]
     DecidedElsewhere(&'static str),
+}
+
+/// The parser's message in one line, without Rust's names of types.
+fn of_value(error: &toml::de::Error) -> String {
+    let mut text = error.to_string().trim().replace('\n', " ");
+    for (rust, plain) in [
+        ("f64", "a number"),
+        ("usize", "a whole number"),
+        ("u64", "a whole number"),
+        ("u32", "a whole number"),
+        ("i32", "a whole number"),
+    ] {
+        text = text.replace(&format!("expected {rust}"), &format!("expected {plain}"));
+    }
+    text
 }
 
 fn did_you_mean(keys: &[String]) -> String {

@@ -106,7 +106,7 @@ pub struct TimeOffset {
 pub enum NoTimeOffset {
     /// Too few pairs of frames whose times are covered by the vehicle's track at every offset searched.
     #[error(
-        "time offset: {} of frames inside the vehicle's track, expected at least {needed}",
+        "time offset: {} of frames with recorded motion at every offset tried, expected at least {needed}",
         count_of(*pairs, "pair")
     )]
     TooFewPairs {

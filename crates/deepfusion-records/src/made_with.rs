@@ -109,8 +109,9 @@ impl MadeWith {
             !self.same_camera(other) || self.calibration_sha256 != other.calibration_sha256;
         [
             (self.version != other.version, Difference::Version),
-            (self.weights != other.weights, Difference::Weights),
+            // First: the weights of an int8 network include its calibration.
             (self.engine != other.engine, Difference::Engine),
+            (self.weights != other.weights, Difference::Weights),
             (self.save != other.save, Difference::Save),
             (self.set != other.set, Difference::Set),
             (

@@ -153,6 +153,16 @@ mod tests {
     }
 
     #[test]
+    fn another_precision_is_another_engine_even_if_its_weights_differ_too() {
+        let f32 = sidecar().made_with;
+        let mut int8 = f32.clone();
+        int8.weights = "ef".into();
+        assert_eq!(int8.difference(&f32), Some(Difference::Weights));
+        int8.engine = "fused int8 on cpu".into();
+        assert_eq!(int8.difference(&f32), Some(Difference::Engine));
+    }
+
+    #[test]
     fn an_incomplete_record_can_be_read_but_is_not_a_sidecar() {
         let text = r#"{"image": "x.png", "size": [4, 2], "scale_trusted": true}"#;
         let shown: PredictionRecord = serde_json::from_str(text).unwrap();

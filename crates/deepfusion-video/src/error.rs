@@ -109,7 +109,7 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
             Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
-            Self::Picture { .. } => "give a PNG or JPEG image",
+            Self::Picture { .. } => "replace it with a PNG or JPEG image",
             Self::Program { problem, .. } => return problem.hint(),
             Self::Packet { problem, .. } => return problem.hint(),
             Self::NotDecoded { hint, .. } => return hint.clone(),

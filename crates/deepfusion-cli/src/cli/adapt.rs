@@ -77,7 +77,7 @@ pub(crate) struct AdaptArgs {
     )]
     pub clock_offset: Option<ClockOffset>,
     /// Uncertainty of the vehicle's speed in per cent (one standard error).
-    #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = not_negative)]
+    #[arg(long, allow_negative_numbers = true, value_name = "PERCENT", default_value_t = 3.0, value_parser = not_negative)]
     pub speed_error: f64,
     /// Random seed.
     #[arg(long, value_name = "S", default_value_t = 0)]

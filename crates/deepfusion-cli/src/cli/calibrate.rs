@@ -4,7 +4,7 @@ use clap::Args;
 use deepfusion_calibrate::LensModel;
 
 use super::Size;
-use super::values::positive;
+use super::values::{board, positive};
 
 /// `deepfusion calibrate`.
 #[derive(Debug, Args)]
@@ -21,12 +21,12 @@ pub(crate) struct CalibrateArgs {
     #[arg(required = true, value_name = "VIDEO|FOLDER|IMAGE")]
     pub inputs: Vec<String>,
     /// Inner corners of the board, where four squares meet: 9x6 for a board of 10x7 squares.
-    #[arg(long, value_name = "WxH")]
+    #[arg(long, value_name = "WxH", value_parser = board)]
     pub board: Size,
     /// Side of a square in metres (25 mm: 0.025).
     ///
     /// The boards' distances depend on it, the camera does not. Without it, no distances are given.
-    #[arg(long, value_name = "M", value_parser = positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "M", value_parser = positive)]
     pub square: Option<f64>,
     /// Fit a fisheye lens by Kannala and Brandt (k1 to k4) instead of Brown and Conrady's model (k1, k2, p1, p2, k3).
     #[arg(long)]

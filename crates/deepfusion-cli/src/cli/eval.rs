@@ -85,10 +85,10 @@ pub(crate) struct EvalArgs {
     #[arg(long, value_parser = names::crop())]
     pub crop: Option<Crop>,
     /// Largest ground-truth depth that counts, in metres; predictions are clamped to it.
-    #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "M", default_value_t = 80.0, value_parser = positive)]
     pub cap: f64,
     /// Smallest ground-truth depth that counts, in metres; predictions are clamped to it.
-    #[arg(long, value_name = "M", default_value_t = 1e-3, value_parser = positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "M", default_value_t = 1e-3, value_parser = positive)]
     pub min: f64,
     /// Add a row with a fixed factor (fixed=F); none and median are always reported.
     #[arg(long, value_name = "none|median|fixed=F", default_value = "none", value_parser = scaling)]
@@ -137,7 +137,7 @@ pub(crate) struct EvalArgs {
     #[arg(long, conflicts_with = "pred")]
     pub no_verdict: bool,
     /// Uncertainty of the vehicle's speed in per cent (one standard error), which the scale certificate's interval allows for.
-    #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = not_negative, conflicts_with_all = ["pred", "no_verdict"])]
+    #[arg(long, allow_negative_numbers = true, value_name = "PERCENT", default_value_t = 3.0, value_parser = not_negative, conflicts_with_all = ["pred", "no_verdict"])]
     pub speed_error: f64,
     /// Assume that training saw none of these frames, if the program cannot know: for networks that were trained elsewhere.
     #[arg(long, conflicts_with_all = ["pred", "no_verdict"])]

@@ -6,10 +6,10 @@ use super::values::positive;
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct LiveArgs {
     /// Stop this many seconds after the first frame.
-    #[arg(long, value_name = "S", help_heading = HEADING, value_parser = positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "S", help_heading = HEADING, value_parser = positive)]
     pub duration: Option<f64>,
     /// Give up on a source that sends nothing for this many seconds [default: 10].
-    #[arg(long, value_name = "S", help_heading = HEADING, value_parser = positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "S", help_heading = HEADING, value_parser = positive)]
     pub timeout: Option<f64>,
 }
 

@@ -30,12 +30,12 @@ pub(crate) struct PredictArgs {
     #[arg(long, value_parser = names::depth_output(), value_delimiter = ',')]
     pub save: Option<Vec<DepthOutput>>,
     /// Leave out cloud points beyond this depth, in metres.
-    #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "M", default_value_t = 80.0, value_parser = positive)]
     pub max_depth: f64,
     /// Leave out cloud points whose standard deviation is above this share of their depth, such as 0.4.
     ///
     /// Needs a network that predicts uncertainty.
-    #[arg(long, value_name = "SHARE", value_parser = positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "SHARE", value_parser = positive)]
     pub max_sigma: Option<f64>,
     /// Predict only shard I of N: every N-th image, in the order of the paths; I counts from 1.
     ///

@@ -59,7 +59,7 @@ pub(crate) struct PredictionArgs {
     ///
     /// The scale monitor, which watches recordings with speed and yaw rate, uses this height; without it, the monitor learns one from the
     /// first frames.
-    #[arg(long, value_name = "M", value_parser = positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "M", value_parser = positive)]
     pub camera_height: Option<f64>,
     /// Slowly correct depth back to the scale of the first hundred frames when the scale monitor detects drift.
     ///

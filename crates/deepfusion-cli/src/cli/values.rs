@@ -39,6 +39,12 @@ impl FromStr for Size {
     }
 }
 
+/// A checkerboard's inner corners, written `9x6`.
+pub(super) fn board(text: &str) -> Result<Size, String> {
+    text.parse::<Size>()
+        .map_err(|_| "expected inner corners as WIDTHxHEIGHT, such as 9x6".into())
+}
+
 /// A camera's numbers as given on the command line, in pixels of the input image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CameraIntrinsics {
@@ -187,6 +193,16 @@ mod tests {
         for bad in ["640", "640x", "0x5", "axb", "640x192x3", "-1x5"] {
             assert!(bad.parse::<Size>().is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn boards() {
+        let corners = Size {
+            width: 9,
+            height: 6,
+        };
+        assert_eq!(board("9x6"), Ok(corners));
+        assert!(board("9").unwrap_err().contains("such as 9x6"));
     }
 
     #[test]

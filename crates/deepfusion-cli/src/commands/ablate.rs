@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::time::Instant;
 
-use deepfusion_data::OpenOptions;
+use deepfusion_data::{GtKind, OpenOptions};
+use deepfusion_jobs::evaluation::has_truth;
 use deepfusion_jobs::training::RunLock;
 use deepfusion_jobs::training::ablation::{
     OpenRun, Plan, PlanRequest, Run, RunResult, TableDecides, table, text,
@@ -42,6 +43,9 @@ pub(super) fn run(args: &AblateArgs) -> Result<()> {
         }
     })?;
     let (_, measured_on) = plan.open_eval_data()?;
+    if !has_truth(&measured_on, GtKind::Z) {
+        return Err(CliError::NoTruth.into());
+    }
     print_warnings(&OpenOptions::default(), &measured_on);
     plan.write(&out)?;
 

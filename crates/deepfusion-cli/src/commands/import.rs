@@ -79,8 +79,8 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
     } else {
         folder.write(&args.out)?
     };
-    let no_camera = if folder.camera.is_none() {
-        missing_camera(&args.out)
+    let missing = if folder.camera.is_none() || args.images.is_some() {
+        still_missing(&args.out)
     } else {
         None
     };
@@ -101,7 +101,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
                 .iter()
                 .chain(&notes)
                 .map(LogNote::to_string)
-                .chain(no_camera)
+                .chain(missing)
                 .collect(),
             written: &args.out,
         });
@@ -120,7 +120,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
         say(&format!("note: {note}"));
     }
     output::print(&format!("{}\n", args.out.display()))?;
-    let then = match no_camera {
+    let then = match missing {
         Some(missing) => {
             say(&format!("still to do: {missing}"));
             "then "
@@ -134,17 +134,18 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
     Ok(())
 }
 
-/// How to give the camera of a folder that was written without one.
-fn missing_camera(out: &Path) -> Option<String> {
+/// What the folder lacks, a camera or images, and how to give it.
+fn still_missing(out: &Path) -> Option<String> {
     use deepfusion_data::Error;
     match Dataset::open(out, &OpenOptions::default()) {
-        Err(error @ (Error::NoCameraFile { .. } | Error::CameraFile { .. })) => {
-            Some(match error.hint_in_options() {
-                Some(hint) => format!("{error}; {hint}"),
-                None => error.to_string(),
-            })
-        }
-        // Other errors are not about the camera, and are reported when the recording is opened.
+        Err(
+            error
+            @ (Error::NoCameraFile { .. } | Error::CameraFile { .. } | Error::NoFrames { .. }),
+        ) => Some(match error.hint_in_options() {
+            Some(hint) => format!("{error}; {hint}"),
+            None => error.to_string(),
+        }),
+        // Other errors are not about what is missing, and are reported when the recording is opened.
         _ => None,
     }
 }

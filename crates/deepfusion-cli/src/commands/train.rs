@@ -136,13 +136,12 @@ pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSu
     let mut recorder = Recorder::open(trainer.folder(), trainer.step(), pace)?;
     let summary = trainer.run(&mut |event| recorder.handle(event))?;
     recorder.finish()?;
+    if summary.step < summary.steps {
+        // The caller's error says so.
+        return Ok(summary);
+    }
     say(&format!(
-        "{} {} of {} in {}{}",
-        if summary.step < summary.steps {
-            "stopped after"
-        } else {
-            "done:"
-        },
+        "done: {} of {} in {}{}",
         summary.step,
         count_of(summary.steps, "step"),
         duration_text(summary.seconds),
@@ -176,6 +175,10 @@ fn warn_of_mean(file: &Path, config: &TrainConfig, args: &TrainArgs) {
 }
 
 fn request(args: &TrainArgs) -> Result<StartRequest> {
+    if let Some(term) = args.with.iter().find(|term| args.without.contains(term)) {
+        let term = term.clone();
+        return Err(CliError::OnAndOff { term }.into());
+    }
     let file = match &args.config {
         Some(path) => {
             let config = TrainConfig::read_over_preset(path, args.device.compute())?;

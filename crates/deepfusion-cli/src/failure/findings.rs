@@ -21,7 +21,7 @@ pub fn in_options(diagnosis: Diagnosis) -> Diagnosis {
 fn message(reason: &FindingReason) -> Option<&'static str> {
     match reason {
         FindingReason::Log(LogReason::NoTurns) => Some(
-            "the turns of the vehicle are unknown: --view-motion vehicle cannot train, and --clock-offset auto has only changes of speed to compare",
+            "the turns of the vehicle are unknown: --view-motion vehicle cannot be used, and --clock-offset auto has only changes of speed to compare",
         ),
         FindingReason::Log(LogReason::CourseAlone) => Some(
             "turns are known from positions alone: enough for --clock-offset auto on a few minutes with bends, but not for --view-motion vehicle",
@@ -124,6 +124,9 @@ mod tests {
             assert!(!reason.hint().contains(" --"), "{reason}");
             assert!(hint(&reason).unwrap().contains("--"), "{reason}");
         }
-        assert_eq!(hint(&FindingReason::Words("log a drive".into())), None);
+        assert_eq!(
+            hint(&FindingReason::Words("record while driving".into())),
+            None
+        );
     }
 }

@@ -111,7 +111,7 @@ impl Reportable for Error {
             }
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
             Self::NoUncertainty => Some(
-                "leave out sigma and confidence from --save, and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
+                "use a network trained with depth_net.uncertainty = true (not with --engine ort), or leave out what needs it: sigma and confidence of --save, --max-sigma, --calibrate-uncertainty"
                     .into(),
             ),
             Self::NothingToPack { .. } => {

@@ -6,6 +6,7 @@ use std::path::Path;
 use deepfusion_data::{
     CalibrationSource, DatasetKind, FileError, NamedTopic, TopicProblem, TopicRole,
 };
+use deepfusion_eval::ExpectedProtocolSetting;
 use deepfusion_hint::{Hint, system_hint};
 use deepfusion_model::ExpectedSetting;
 use deepfusion_runtime::EngineProblem;
@@ -125,7 +126,10 @@ impl Reportable for deepfusion_doctor::NoCameraAhead {
         let hint = self.hint();
         match self {
             // These hints end with the offset to give.
-            Self::NotFound { .. } | Self::Weak { .. } | Self::Unsure { .. } => hint.map(|hint| {
+            Self::NoSpeeds { .. }
+            | Self::NotFound { .. }
+            | Self::Weak { .. }
+            | Self::Unsure { .. } => hint.map(|hint| {
                 format!("{hint}: --clock-offset MS (without it the clocks are taken to agree)")
             }),
             _ => hint,
@@ -205,7 +209,7 @@ impl Reportable for deepfusion_data::Error {
             } => hint.map(|hint| format!("{hint}; {TAKE_CAMERA} --intrinsics 585,585,320,240")),
             Self::NoCameraFile { .. } | Self::NoBagCamera { .. } => hint.map(|hint| {
                 format!(
-                    "{hint}; `deepfusion calibrate` measures a camera; {TAKE_CAMERA} --hfov 70, and train, as a last resort, --intrinsics learn"
+                    "{hint} (`deepfusion calibrate` measures a camera); {TAKE_CAMERA} --hfov 70; train, as a last resort, --intrinsics learn"
                 )
             }),
             Self::OwnCalibration { .. } => {
@@ -230,7 +234,7 @@ impl Reportable for deepfusion_data::Error {
                         | TopicProblem::OtherType { config: None, .. }
                 ) =>
             {
-                hint.map(|hint| format!("--topic: {hint}"))
+                hint.map(|hint| format!("with --topic, {hint}"))
             }
             Self::InertialUnit { .. } => {
                 or(&format!("--topic {}={}", TopicRole::Imu, NamedTopic::NONE))
@@ -262,6 +266,17 @@ impl Reportable for deepfusion_data::Error {
 }
 
 impl Reportable for deepfusion_eval::Error {
+    fn message(&self) -> String {
+        match self {
+            Self::Protocol {
+                value,
+                expected: ExpectedProtocolSetting::MetresAboveMinimum,
+                ..
+            } => format!("--cap is {value} m, expected more than --min"),
+            _ => self.to_string(),
+        }
+    }
+
     fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::InvalidPrediction { kind, .. } => Some(format!(
@@ -277,6 +292,10 @@ impl Reportable for deepfusion_eval::Error {
                 "check that the ground truth is in metres, with 0 where it is unknown, and that --crop and --cap leave pixels"
                     .into(),
             ),
+            Self::Protocol {
+                expected: ExpectedProtocolSetting::MetresAboveMinimum,
+                ..
+            } => Some("raise --cap or lower --min".into()),
             Self::Intervals { .. } => {
                 Some("write them again with `eval --calibrate-uncertainty`".into())
             }
@@ -288,14 +307,14 @@ impl Reportable for deepfusion_eval::Error {
 impl Reportable for deepfusion_eval::compare::Error {
     fn hint_in_options(&self) -> Option<String> {
         match self {
-            Self::NotAnEvaluation { .. } => Some(
-                "give a run's folder, a file of its eval/ folder, or what `eval --json` printed"
-                    .into(),
-            ),
-            Self::NotEvaluated { path } => Some(format!(
+            Self::NotEvaluated { path } if path.join("config.toml").is_file() => Some(format!(
                 "evaluate it first: deepfusion eval --model {} --data PATH",
                 path.display()
             )),
+            Self::NotAnEvaluation { .. } | Self::NotEvaluated { .. } => Some(
+                "give a run's folder, a file of its eval/ folder, or what `eval --json` printed"
+                    .into(),
+            ),
             _ => self.hint(),
         }
     }

@@ -226,6 +226,14 @@ mod tests {
     }
 
     #[test]
+    fn clocks_that_cannot_be_compared_name_the_option_for_the_offset() {
+        let drive = "monday".to_owned();
+        let error = deepfusion_doctor::NoCameraAhead::NoSpeeds { drive };
+        let hint = Failure::from(error).hint().unwrap();
+        assert!(hint.contains("--clock-offset MS"), "{hint}");
+    }
+
+    #[test]
     fn causes_follow_the_failure_and_are_not_repeated() {
         let system = std::io::Error::from(ErrorKind::NotFound);
         let cause = system.to_string();

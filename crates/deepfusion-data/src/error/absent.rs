@@ -53,7 +53,7 @@ impl NoFramesReason {
                 "record for longer than the encoder's interval between key frames, or shorten that interval"
             }
             Self::NoImageTopic { .. } => {
-                "set topics.image in the file beside the bag to the camera's topic"
+                "record the camera's topic too (sensor_msgs/Image or CompressedImage)"
             }
         }
     }
@@ -64,13 +64,13 @@ impl NoFramesReason {
 #[non_exhaustive]
 pub enum NoTrackReason {
     /// It has no measured speeds.
-    #[error("it has no speeds")]
+    #[error("no speeds")]
     NoSpeeds {
         /// The recording's layout, which determines where speeds come from.
         layout: DatasetKind,
     },
     /// Speeds could be computed from the poses, but these have no times.
-    #[error("it has no speeds")]
+    #[error("no speeds")]
     UntimedPoses,
     /// It has speeds, but the frames have no times.
     #[error("its frames have no times")]

@@ -31,6 +31,12 @@ impl fmt::Display for Quantity {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColumnsProblem {
+    /// The file has no header.
+    #[error("the file is empty")]
+    Empty {
+        /// An example of a valid header.
+        example: &'static str,
+    },
     /// A required column is missing.
     #[error("no column '{wanted}', only {}", found.join(", "))]
     NoColumn {
@@ -96,7 +102,7 @@ fn is_or_are(count: usize) -> &'static str {
 impl ColumnsProblem {
     pub(super) fn hint(&self) -> String {
         let text = match self {
-            Self::NoColumn { example, .. } => {
+            Self::Empty { example } | Self::NoColumn { example, .. } => {
                 return format!(
                     "write the names of the columns in the first line, such as {example}"
                 );

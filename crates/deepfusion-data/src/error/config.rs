@@ -74,19 +74,19 @@ pub enum ConfigProblem {
     #[error(transparent)]
     Can(#[from] CanProblem),
     /// The folder has several videos, and none is named.
-    #[error("the folder has {count} videos: choose one with video = \"…\", or give its path")]
+    #[error("the folder has {count} videos, and `video` chooses none")]
     SeveralVideos {
         /// Number of videos.
         count: usize,
     },
     /// The folder has several GPS tracks, and none is named.
-    #[error("the folder has {count} tracks (.gpx, .nmea): choose one with speed = \"…\"")]
+    #[error("the folder has {count} tracks (.gpx, .nmea), and `speed` chooses none")]
     SeveralTracks {
         /// Number of tracks.
         count: usize,
     },
     /// The folder has images and a video, and neither is named.
-    #[error("the folder has images and a video ({}): choose with images = \"…\" or video = \"…\"", video.display())]
+    #[error("the folder has images and a video ({}), and neither `images` nor `video` is set", video.display())]
     ImagesAndVideo {
         /// Path of the video.
         video: PathBuf,

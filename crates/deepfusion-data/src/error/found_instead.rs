@@ -101,13 +101,18 @@ impl fmt::Display for FoundInstead {
                 files,
                 folders,
                 such_as,
-            } => write!(
-                f,
-                "it has {} and {} (such as {})",
-                count_of(*files, "file"),
-                count_of(*folders, "folder"),
-                such_as.display()
-            ),
+            } => {
+                let files = count_of(*files, "file");
+                let in_folders = match folders {
+                    0 => String::new(),
+                    _ => format!(" and {}", count_of(*folders, "folder")),
+                };
+                write!(
+                    f,
+                    "it has {files}{in_folders}, such as {}",
+                    such_as.display()
+                )
+            }
         }?;
         if cfg!(not(feature = "ros2")) && self.has_ros2_bags() {
             f.write_str(

@@ -1,6 +1,6 @@
 //! What to do about each error.
 
-use super::{Error, FoundInstead};
+use super::{ConfigProblem, Error, FoundInstead};
 use crate::{DatasetKind, ImageProblem, NamedTopic};
 use deepfusion_hint::Hint;
 
@@ -69,8 +69,8 @@ impl Hint for Error {
                 "set intrinsics = [910, 910, 582, 437] in dataset.toml, as comma2k19's own code does for its 1164x874 videos"
             }
             Self::NoCameraFile { .. } => {
-                "write hfov_deg = 70 (its horizontal field of view in degrees) or intrinsics = [fx, fy, cx, cy] into dataset.toml there, or \
-                 put its calibration file (calibration.yaml, intrinsics.txt) beside it"
+                "set hfov_deg = 70 (its horizontal field of view in degrees) or intrinsics = [fx, fy, cx, cy] in dataset.toml, or add \
+                 calibration.yaml or intrinsics.txt"
             }
             Self::NoPlaceForFrames { video, .. } => {
                 return Some(format!(
@@ -92,6 +92,18 @@ impl Hint for Error {
             Self::NoTrack { reason, .. } => reason.hint(),
             Self::NoFrames { reason, .. } => reason.hint(),
             Self::NoSegmentVideo { .. } => "fetch video.hevc of the segment",
+            Self::Config {
+                problem: ConfigProblem::SeveralVideos { .. },
+                ..
+            } => "give the video's path, or set video = \"NAME\" in dataset.toml",
+            Self::Config {
+                problem: ConfigProblem::SeveralTracks { .. },
+                ..
+            } => "set speed = \"NAME\" in dataset.toml",
+            Self::Config {
+                problem: ConfigProblem::ImagesAndVideo { .. },
+                ..
+            } => "set images = \"FOLDER\" or video = \"NAME\" in dataset.toml",
             Self::Config { .. } => {
                 concat!(
                     "for the keys of dataset.toml and bag.toml, see ",
@@ -99,7 +111,7 @@ impl Hint for Error {
                     "/tree/main/docs/reference"
                 )
             }
-            Self::Table { .. } => "correct the row or delete it",
+            Self::Table { .. } | Self::Row { .. } => "correct the row or delete it",
             Self::Clocks { .. } => {
                 "make both count from the same moment: set start_s in dataset.toml to the first frame's time on the speeds' clock"
             }
@@ -121,7 +133,7 @@ impl Hint for Error {
                 problem: ImageProblem::NotDepth,
                 ..
             } => "give depth images as 16-bit grey PNG",
-            Self::Image { .. } => "give a PNG or JPEG image",
+            Self::Image { .. } => "replace it with a PNG or JPEG image, or leave it out",
             Self::FrameSize { .. } => {
                 "use the images and the calibration of one recording; resized images need their own calibration"
             }
@@ -155,7 +167,8 @@ impl Hint for Error {
             Self::Offsets { .. } => "use [1] for pairs or [-1, 1] for three frames",
             Self::OneFrame { .. } => "train on a longer drive; this one can only be evaluated on",
             Self::Standing { .. } => {
-                "leave out the drive, since a camera standing still shows no parallax, or lower min_speed_mps in the training's configuration"
+                "leave out the drive, since a camera standing still shows no parallax; if it did move, correct its speeds, or lower \
+                 min_speed_mps in the training's configuration"
             }
             Self::NoPairs {
                 frame_distance_m, ..
@@ -168,7 +181,7 @@ impl Hint for Error {
             Self::Cloud(inner) => return inner.hint(),
             Self::Array { .. } => "check the free space and the permissions of the folder",
             Self::NoScans { .. } => {
-                "fetch the drive's velodyne_points (velodyne_points/data/<frame>.bin)"
+                "fetch the scans (KITTI raw: velodyne_points/data/<frame>.bin), or set depth in dataset.toml to a folder of depth images"
             }
             Self::Size { .. } => return None,
         };

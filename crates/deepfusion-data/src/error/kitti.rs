@@ -83,7 +83,7 @@ pub enum OxtsProblem {
         text: String,
     },
     /// A value is NaN or infinite.
-    #[error("is {value}, expected a finite number")]
+    #[error("{value}, expected a finite number")]
     NotFinite {
         /// The value.
         value: f64,

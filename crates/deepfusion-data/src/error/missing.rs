@@ -79,7 +79,7 @@ impl MissingPart {
             Self::TimeStamps => {
                 "fetch the drive's time stamps: ego-motion needs the true times, not a nominal frame rate"
             }
-            Self::Tracklets => "fetch the drive's tracklets, or evaluate without them",
+            Self::Tracklets => "fetch the drive's tracklets, or give a drive with labelled boxes",
             Self::LabelledImage => "fetch the image, or remove its label file",
             Self::SequenceProjections => {
                 "put the sequence's calibration there (data_odometry_calib.zip)"

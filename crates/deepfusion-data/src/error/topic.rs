@@ -80,11 +80,11 @@ pub enum TopicProblem {
     Cloud(#[source] MessageError),
 }
 
-/// What a role's topic must be, with the place where it is set: the file beside the bag, or the caller.
-fn named_in(config: Option<&Path>, role: TopicRole, must: &str) -> String {
+/// What to set a role's topic to, and where it is set: in the file beside the bag, or by the caller.
+fn named_in(config: Option<&Path>, role: TopicRole, to: &str) -> String {
     match config {
-        Some(config) => format!("topics.{role} {must} (in {})", config.display()),
-        None => format!("{role} {must}"),
+        Some(config) => format!("set topics.{role} to {to} (in {})", config.display()),
+        None => format!("set {role} to {to}"),
     }
 }
 
@@ -99,7 +99,7 @@ impl TopicProblem {
                 ..
             } => {
                 let of = there.join(", ");
-                named_in(config.as_deref(), *role, &format!("must be one of: {of}"))
+                named_in(config.as_deref(), *role, &format!("one of: {of}"))
             }
             Self::OtherType {
                 role,
@@ -108,7 +108,7 @@ impl TopicProblem {
                 ..
             } => {
                 let of = expected.join(" or ");
-                named_in(config.as_deref(), *role, &format!("must be a topic of {of}"))
+                named_in(config.as_deref(), *role, &format!("a topic of {of}"))
             }
             Self::Several {
                 role,

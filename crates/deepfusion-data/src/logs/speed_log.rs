@@ -327,7 +327,7 @@ fn course_table(
             warnings.push(MotionWarning::NoCourseRates.into());
             return Ok(None);
         }
-        Err(error @ Error::Table { .. }) => {
+        Err(error @ (Error::Table { .. } | Error::Row { .. })) => {
             let why = error.to_string();
             warnings.push(MotionWarning::CourseNotRead { why }.into());
             return Ok(None);

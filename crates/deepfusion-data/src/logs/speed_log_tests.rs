@@ -131,6 +131,11 @@ fn bad_rows_are_named() {
         ),
         ("time_s,speed_mps\n", "no row below the header"),
         (
+            "time_s,speed_mps\n0,1,2\n",
+            ":2: 3 values, but the header has 2",
+        ),
+        ("", "speed.csv: the file is empty"),
+        (
             "time_s,sped_mps\n0,1\n",
             "no column 'speed', only time_s, sped_mps",
         ),

@@ -26,7 +26,7 @@ impl Table {
     /// Reads a table with values separated by commas, semicolons or tabs, depending on its header.
     ///
     /// # Errors
-    /// [`Error::File`]; [`Error::Table`] if the number of values in a row differs from that in the header.
+    /// [`Error::File`]; [`Error::Row`] if the number of values in a row differs from that in the header.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         let first = bytes.split(|b| *b == b'\n').next().unwrap_or(&[]);
@@ -35,10 +35,9 @@ impl Table {
             .delimiter(delimiter)
             .trim(csv::Trim::All)
             .from_reader(&bytes[..]);
-        let refused = |error: csv::Error| Error::Table {
+        let refused = |error: csv::Error| Error::Row {
             path: path.to_owned(),
             line: error.position().map_or(1, csv::Position::line),
-            column: "any".into(),
             problem: match error.kind() {
                 csv::ErrorKind::UnequalLengths {
                     expected_len, len, ..
@@ -79,10 +78,14 @@ impl Table {
     /// [`Self::column`], or an error that lists the existing columns.
     pub(crate) fn require(&self, names: &[&str], example: &'static str) -> Result<&Column> {
         self.column(names).ok_or_else(|| {
-            self.lacks(ColumnsProblem::NoColumn {
-                wanted: names[0].to_owned(),
-                found: self.columns.iter().map(|c| c.header.clone()).collect(),
-                example,
+            self.lacks(if self.columns.is_empty() {
+                ColumnsProblem::Empty { example }
+            } else {
+                ColumnsProblem::NoColumn {
+                    wanted: names[0].to_owned(),
+                    found: self.columns.iter().map(|c| c.header.clone()).collect(),
+                    example,
+                }
             })
         })
     }

@@ -110,7 +110,7 @@ fn callers_can_name_topics() {
     let picture = deepfusion_data::RgbImage::new(8, 8);
     deepfusion_data::save_png(&picture, &folder.path().join("0.png")).unwrap();
     let text = refusal(open_with(folder.path(), &["image=/twist"]));
-    assert_contains(&text, &["image=/twist", "has no topics"]);
+    assert_contains(&text, &["image=/twist", "have no topics"]);
 }
 
 /// `nmea_navsat_driver` and ublox write east and north instead of forward and left.
@@ -246,7 +246,7 @@ fn an_unusable_inertial_unit_can_be_left_out() {
     assert_contains(&text_of(still.warnings()), &["/imu: not read"]);
     // Images are required.
     let text = refusal(open_with(&apart.bag, &["imu=none", "image=none"]));
-    assert_contains(&text, &["no topic none", "hint: image must be one of"]);
+    assert_contains(&text, &["no topic none", "hint: set image to one of"]);
 }
 
 #[test]

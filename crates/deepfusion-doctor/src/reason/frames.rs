@@ -28,7 +28,7 @@ pub enum FramesReason {
     },
     /// The vehicle's motion is unknown at some times.
     #[error(
-        "the vehicle's motion is unknown for {unknown_s:.1} s in {}, the first from frame {first}: its speed has gaps there, and no pair of these frames can train",
+        "the vehicle's motion is unknown for {unknown_s:.1} s in {}, the first from frame {first}: its speed has gaps there, and no pair of these frames can be used for training",
         count_of(*stretches, "stretch")
     )]
     UnknownMotion {
@@ -40,7 +40,7 @@ pub enum FramesReason {
         first: u64,
     },
     /// The log of speeds does not cover all images.
-    #[error("the speeds {}: frames beyond them cannot train", beside(*before_s, *after_s))]
+    #[error("the speeds {}: frames beyond them cannot be used for training", beside(*before_s, *after_s))]
     BesideLog {
         /// Time from the first image to the first speed, seconds.
         before_s: f64,
@@ -149,24 +149,24 @@ mod tests {
                     before_s: 0.0,
                     after_s: 0.8,
                 },
-                "the speeds end 0.8 s before the last image: frames beyond them cannot train",
+                "the speeds end 0.8 s before the last image: frames beyond them cannot be used for training",
             ),
             (
                 FramesReason::BesideLog {
                     before_s: 0.5,
                     after_s: 0.8,
                 },
-                "the speeds begin 0.5 s after the first image and end 0.8 s before the last: frames beyond them cannot train",
+                "the speeds begin 0.5 s after the first image and end 0.8 s before the last: frames beyond them cannot be used for training",
             ),
             (
                 unknown(1),
                 "the vehicle's motion is unknown for 1.6 s in 1 stretch, the first from frame 40: its speed has gaps there, and no pair of \
-                 these frames can train",
+                 these frames can be used for training",
             ),
             (
                 unknown(2),
                 "the vehicle's motion is unknown for 1.6 s in 2 stretches, the first from frame 40: its speed has gaps there, and no pair of \
-                 these frames can train",
+                 these frames can be used for training",
             ),
         ] {
             assert_eq!(reason.to_string(), message);

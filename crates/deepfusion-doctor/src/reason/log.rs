@@ -126,7 +126,9 @@ impl LogReason {
                 "if the vehicle did not stop in between, set max_gap_s in dataset.toml to interpolate over it"
             }
             Self::TooFast { .. } => "give the unit of speed (m/s, km/h, mph, knots)",
-            Self::Standing { .. } => "log a drive",
+            Self::Standing { .. } => {
+                "record while driving, or choose another column if this is not the speed"
+            }
             Self::Unsure { .. } => {
                 "drive faster or longer, or log the vehicle's own speed: OBD, CAN"
             }

@@ -17,7 +17,7 @@ pub enum OpeningReason {
     /// The drive has no pair of frames to learn from.
     #[error(
         "{}: {problem}",
-        if *left_out { "training leaves this drive out" } else { "no pair of frames can train" }
+        if *left_out { "training leaves this drive out" } else { "no pair of frames can be used for training" }
     )]
     NoPair {
         /// Whether training continues without it: other drives of its folder have pairs, and nothing else is wrong with it.
@@ -73,7 +73,7 @@ mod tests {
         let problem = SharedError::from(error);
         for (left_out, what) in [
             (true, "training leaves this drive out"),
-            (false, "no pair of frames can train"),
+            (false, "no pair of frames can be used for training"),
         ] {
             let problem = problem.clone();
             let reason = OpeningReason::NoPair { left_out, problem };

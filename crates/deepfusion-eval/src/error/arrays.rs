@@ -9,7 +9,7 @@ use zip::result::ZipError;
 #[non_exhaustive]
 pub enum ArrayProblem {
     /// The file is of another kind.
-    #[error("is neither an .npz nor an .npy file")]
+    #[error("neither an .npz nor an .npy file")]
     NotArrays,
     /// The file is empty.
     #[error("has no arrays")]
@@ -66,7 +66,8 @@ impl ArrayProblem {
             Self::NotArrays => Some(
                 "write it with numpy.savez (arrays with names) or numpy.save (N×H×W in split order)",
             ),
-            Self::Empty | Self::NoSuchArray { .. } => None,
+            Self::Empty => Some("write one array per image, with numpy.savez"),
+            Self::NoSuchArray { .. } => None,
             Self::Shape { .. } => {
                 Some("write one H×W array per image; for images of different sizes, use an .npz")
             }

@@ -1,4 +1,5 @@
-use deepfusion_hint::{Hint, count_of};
+use deepfusion_hint::{Hint, count_of, system_hint};
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use crate::weights::FormatProblem;
@@ -32,6 +33,13 @@ pub enum NetworkError {
         width: usize,
         /// Height in pixels.
         height: usize,
+    },
+
+    /// A file to be opened that does not exist.
+    #[error("{}: no such file or folder", path.display())]
+    NoSuchFile {
+        /// Path of the file.
+        path: PathBuf,
     },
 
     /// A file that could not be opened, read, written or renamed.
@@ -215,7 +223,8 @@ impl Hint for NetworkError {
             Self::Io { action, .. } if *action == "write" => {
                 "check the folder, its permissions and the free space"
             }
-            Self::Io { .. } => "check the path",
+            Self::NoSuchFile { .. } => system_hint(ErrorKind::NotFound),
+            Self::Io { source, .. } => system_hint(source.kind()),
             Self::Format { .. } => {
                 "give a complete .safetensors file, or a state dictionary (.pth, .pt) saved by torch.save"
             }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fs;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use deepfusion_fs::Partial;
@@ -195,8 +195,12 @@ fn little_endian(values: &[f32]) -> Cow<'_, [u8]> {
 }
 
 fn io_error(path: &Path, action: &'static str, source: std::io::Error) -> NetworkError {
+    let path = path.to_owned();
+    if action == "open" && source.kind() == ErrorKind::NotFound {
+        return NetworkError::NoSuchFile { path };
+    }
     NetworkError::Io {
-        path: path.to_owned(),
+        path,
         action,
         source,
     }

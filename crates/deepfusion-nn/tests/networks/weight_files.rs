@@ -183,7 +183,7 @@ fn files_that_are_not_weights_are_refused_with_a_reason() {
     reason(b"\x80\x02 but no pickle");
     reason(b"\x40\x00\x00\x00\x00\x00\x00\x00{\"a\":");
     let missing = weights::read(&folder.path().join("nowhere.pth")).unwrap_err();
-    assert!(matches!(missing, Error::Io { .. }));
+    assert!(matches!(missing, Error::NoSuchFile { .. }));
 }
 
 #[test]

@@ -323,9 +323,9 @@ mod tests {
             ),
             (
                 MotionWarning::CourseNotRead {
-                    why: "course.csv:2: column any: 1 value".into(),
+                    why: "course.csv:2: 1 value".into(),
                 },
-                "not read: course.csv:2: column any: 1 value",
+                "not read: course.csv:2: 1 value",
             ),
             (
                 MotionWarning::SegmentWithoutTurns,
