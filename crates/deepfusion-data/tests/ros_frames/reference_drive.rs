@@ -74,7 +74,7 @@ fn is_the_drive(dataset: &Dataset, known: &DriveFacts) {
         &warnings,
         &[
             "/gnss/fix: 1 of 10 messages left out for lack of a position",
-            "median standard deviation 0.",
+            "median standard deviation of 0.",
             "bridged",
         ],
     );
