@@ -74,6 +74,7 @@ pub struct Sidecar {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Difference;
     use deepfusion_motion::{ScaleReading, ScaleState};
 
     fn sidecar() -> Sidecar {

@@ -62,6 +62,8 @@ impl Reportable for deepfusion_sim::Error {
     fn exit(&self) -> Exit {
         match self {
             Self::Stopped { .. } => Exit::Stopped,
+            // Each of these options is given by the caller: simulate reads no configuration file.
+            Self::Config { field, .. } if simulator_option(field).is_some() => Exit::WrongArguments,
             _ => Exit::Failed,
         }
     }
