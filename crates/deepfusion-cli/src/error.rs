@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
+use deepfusion_data::NamedTopic;
 use deepfusion_hint::count_of;
 use deepfusion_sim::VariedConflict;
 
@@ -257,6 +258,14 @@ pub(crate) enum CliError {
         /// The option.
         option: &'static str,
     },
+    /// A topic for inputs without topics.
+    #[error("{input}: not a bag, so it has no topics for `--topic {topic}`")]
+    NoTopics {
+        /// What was given.
+        input: String,
+        /// The topic.
+        topic: NamedTopic,
+    },
     /// An option of the scale monitor for an input that lacks speed or yaw rate.
     #[error("{input}: {why}, but `{option}` needs both speed and yaw rate")]
     Unwatched {
@@ -353,6 +362,7 @@ impl Reportable for CliError {
             Self::OnlyLive { .. } => {
                 Some("leave it out, or give camera:0, an address such as rtsp://…, or - for standard input".into())
             }
+            Self::NoTopics { .. } => Some("leave out --topic, or give a bag".into()),
             Self::Unwatched { .. } => Some("leave it out, or give only recordings with speed and yaw rate".into()),
             Self::CorrectShard => Some("leave out --shard, and give each run its own recordings".into()),
             Self::VideoShard => {
