@@ -68,6 +68,12 @@ pub(crate) enum CliError {
         /// Whether the input is a log of speeds by itself.
         is_log: bool,
     },
+    /// A DBC file for a log without CAN frames.
+    #[error("{}: --dbc does not apply to it: it is not a CAN trace", path.display())]
+    NotACanTrace {
+        /// The log.
+        path: PathBuf,
+    },
     /// An option that does not apply to the layout to be written.
     #[error("{option} does not apply to this layout: {why}")]
     OtherLayout {
@@ -291,6 +297,7 @@ impl Reportable for CliError {
             // Clap cannot check these: they depend on the embedded networks and on the contents of the given path.
             Self::NoModelGiven
             | Self::OutOfPlace { .. }
+            | Self::NotACanTrace { .. }
             | Self::OtherLayout { .. }
             | Self::Varied { .. } => Exit::WrongArguments,
             #[cfg(feature = "train")]
@@ -378,6 +385,9 @@ impl Reportable for CliError {
             ),
             Self::OutOfPlace { .. } => Some(
                 "leave it out: a recording's dataset.toml describes its log (time_column, speed_column, speed_unit, dbc)".into(),
+            ),
+            Self::NotACanTrace { .. } => Some(
+                "leave it out, or give a CAN trace: candump's log, .asc or .blf".into(),
             ),
             Self::OtherLayout { layout, .. } => Some(format!("leave it out, or give --format {layout}")),
             Self::Varied { why, .. } => Some(

@@ -347,6 +347,19 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
     let printed = run(&at, &format!("doctor vector.blf {can}"));
     assert_eq!(printed.code, 0, "{}", printed.stderr);
     assert_eq!(run(&at, "doctor vector.blf").code, 1);
+    // Only CAN traces need a DBC file, whether it exists or not.
+    for command in [
+        "doctor torque.csv --dbc missing.dbc",
+        "doctor phone.gpx --dbc vehicle.dbc",
+        "data import torque.csv --dbc missing.dbc --images . --out drive",
+    ] {
+        let printed = run(&at, command);
+        assert_eq!(printed.code, 2, "{command}: {}", printed.stderr);
+        let expected = "--dbc does not apply to it: it is not a CAN trace";
+        assert!(printed.stderr.contains(expected), "{}", printed.stderr);
+    }
+    let missing = run(&at, "doctor vector.blf --dbc missing.dbc").stdout;
+    assert!(missing.contains("missing.dbc"), "{missing}");
     // A log has no camera and no images.
     for option in ["--hfov 60", "--clock-offset auto", "--report page.html"] {
         let name = option.split(' ').next().unwrap();
