@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
+use deepfusion_data::NamedTopic;
 use deepfusion_hint::count_of;
 use deepfusion_sim::VariedConflict;
 
@@ -66,6 +67,12 @@ pub(crate) enum CliError {
         option: &'static str,
         /// Whether the input is a log of speeds by itself.
         is_log: bool,
+    },
+    /// A DBC file for a log without CAN frames.
+    #[error("{}: --dbc does not apply to it: it is not a CAN trace", path.display())]
+    NotACanTrace {
+        /// The log.
+        path: PathBuf,
     },
     /// An option that does not apply to the layout to be written.
     #[error("{option} does not apply to this layout: {why}")]
@@ -257,6 +264,14 @@ pub(crate) enum CliError {
         /// The option.
         option: &'static str,
     },
+    /// A topic for inputs without topics.
+    #[error("{input}: not a bag, so it has no topics for `--topic {topic}`")]
+    NoTopics {
+        /// What was given.
+        input: String,
+        /// The topic.
+        topic: NamedTopic,
+    },
     /// An option of the scale monitor for an input that lacks speed or yaw rate.
     #[error("{input}: {why}, but `{option}` needs both speed and yaw rate")]
     Unwatched {
@@ -282,6 +297,7 @@ impl Reportable for CliError {
             // Clap cannot check these: they depend on the embedded networks and on the contents of the given path.
             Self::NoModelGiven
             | Self::OutOfPlace { .. }
+            | Self::NotACanTrace { .. }
             | Self::OtherLayout { .. }
             | Self::Varied { .. } => Exit::WrongArguments,
             #[cfg(feature = "train")]
@@ -353,6 +369,7 @@ impl Reportable for CliError {
             Self::OnlyLive { .. } => {
                 Some("leave it out, or give camera:0, an address such as rtsp://…, or - for standard input".into())
             }
+            Self::NoTopics { .. } => Some("leave out --topic, or give a bag".into()),
             Self::Unwatched { .. } => Some("leave it out, or give only recordings with speed and yaw rate".into()),
             Self::CorrectShard => Some("leave out --shard, and give each run its own recordings".into()),
             Self::VideoShard => {
@@ -368,6 +385,9 @@ impl Reportable for CliError {
             ),
             Self::OutOfPlace { .. } => Some(
                 "leave it out: a recording's dataset.toml describes its log (time_column, speed_column, speed_unit, dbc)".into(),
+            ),
+            Self::NotACanTrace { .. } => Some(
+                "leave it out, or give a CAN trace: candump's log, .asc or .blf".into(),
             ),
             Self::OtherLayout { layout, .. } => Some(format!("leave it out, or give --format {layout}")),
             Self::Varied { why, .. } => Some(

@@ -571,6 +571,16 @@ fn a_topic_is_named_by_an_option() {
         "data inspect street --topic speed=/gnss/fix",
         &["speed=/gnss/fix", "KITTI raw", "--topic"],
     );
+    // Nor for images and live sources.
+    let photo = at.join("photo.png");
+    image::RgbImage::new(64, 48).save(&photo).unwrap();
+    for input in ["predict photo.png", "perceive photo.png", "predict -"] {
+        fails(
+            at,
+            &format!("{input} --topic image=/front --model run --out depth"),
+            &["not a bag", "`--topic image=/front`", "give a bag"],
+        );
+    }
     fails(
         at,
         "data inspect street --write-config",

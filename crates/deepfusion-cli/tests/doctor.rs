@@ -347,6 +347,19 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
     let printed = run(&at, &format!("doctor vector.blf {can}"));
     assert_eq!(printed.code, 0, "{}", printed.stderr);
     assert_eq!(run(&at, "doctor vector.blf").code, 1);
+    // Only CAN traces need a DBC file, whether it exists or not.
+    for command in [
+        "doctor torque.csv --dbc missing.dbc",
+        "doctor phone.gpx --dbc vehicle.dbc",
+        "data import torque.csv --dbc missing.dbc --images . --out drive",
+    ] {
+        let printed = run(&at, command);
+        assert_eq!(printed.code, 2, "{command}: {}", printed.stderr);
+        let expected = "--dbc does not apply to it: it is not a CAN trace";
+        assert!(printed.stderr.contains(expected), "{}", printed.stderr);
+    }
+    let missing = run(&at, "doctor vector.blf --dbc missing.dbc").stdout;
+    assert!(missing.contains("missing.dbc"), "{missing}");
     // A log has no camera and no images.
     for option in ["--hfov 60", "--clock-offset auto", "--report page.html"] {
         let name = option.split(' ').next().unwrap();
@@ -354,6 +367,60 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
         assert_eq!(printed.code, 2);
         let expected = format!("{name} does not apply to a log of speeds by itself");
         assert!(printed.stderr.contains(&expected), "{}", printed.stderr);
+    }
+}
+
+/// A folder of images with a frame and a speed every tenth of a second.
+fn write_folder(drive: &std::path::Path, speeds_mps: &[f64]) {
+    let images = drive.join("images");
+    fs::create_dir_all(&images).unwrap();
+    let (mut frames, mut speeds) = ("time_s,file\n".to_owned(), "time_s,speed_mps\n".to_owned());
+    for (i, speed_mps) in speeds_mps.iter().enumerate() {
+        let grey = |x: u32, y: u32| image::Rgb([(x * 7 + y * 13 + i as u32 * 5) as u8; 3]);
+        let image = image::RgbImage::from_fn(96, 64, grey);
+        image.save(images.join(format!("{i}.png"))).unwrap();
+        let time_s = 0.1 * i as f64;
+        frames += &format!("{time_s:.1},{i}.png\n");
+        speeds += &format!("{time_s:.1},{speed_mps}\n");
+    }
+    fs::write(drive.join("frames.csv"), frames).unwrap();
+    fs::write(drive.join("speed.csv"), speeds).unwrap();
+    fs::write(drive.join("intrinsics.txt"), "80 80 48 32\n").unwrap();
+}
+
+#[test]
+fn a_speed_that_no_road_vehicle_reaches_is_reported_with_its_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let found = |speeds_mps: &[f64]| {
+        write_folder(&at.join("drive"), speeds_mps);
+        let text = run(at, "doctor drive --json").stdout;
+        let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let findings = report["findings"].as_array().unwrap().iter();
+        let of_speed = findings.map(|found| found["finding"].clone());
+        let too_fast = |found: &serde_json::Value| {
+            found["check"] == "speed" && found["figure"]["quantity"] == "fastest"
+        };
+        of_speed.filter(too_fast).collect::<Vec<_>>()
+    };
+    // A sports car on a motorway.
+    assert!(found(&[69.0; 12]).is_empty());
+    for mps in [-500.0, 500.0] {
+        let mut speeds_mps = [12.0; 12];
+        speeds_mps[5] = mps;
+        let findings = found(&speeds_mps);
+        let [finding] = &findings[..] else {
+            panic!("{findings:#?}");
+        };
+        assert_eq!(finding["severity"], "warning");
+        assert_eq!(finding["frame"], 5);
+        let (what, hint) = (&finding["what"], &finding["remedy"]);
+        let expected = format!(
+            "at 0.50 s the speed is {mps:.0} m/s ({:.0} km/h)",
+            3.6 * mps
+        );
+        assert!(what.as_str().unwrap().contains(&expected), "{what}");
+        assert!(hint.as_str().unwrap().contains("speed_kmh"), "{hint}");
     }
 }
 

@@ -67,6 +67,7 @@ fn an_exported_file_computes_what_the_network_does() {
 
     // No file is overwritten unasked, and a failure leaves no files behind.
     fs::write(at.join("text.so"), "no library").unwrap();
+    fs::create_dir(at.join("folder.onnx")).unwrap();
     let files = || {
         let mut names: Vec<_> = fs::read_dir(at)
             .unwrap()
@@ -78,7 +79,7 @@ fn an_exported_file_computes_what_the_network_does() {
     let before = files();
     for (args, named) in [
         ("--model run --out depth.onnx", "depth.onnx"),
-        ("--model run --out sim --overwrite", "sim"),
+        ("--model run --out folder.onnx --overwrite", "folder.onnx"),
         ("--model sim --out new.onnx", "sim"),
         ("--model run --out new.onnx --size 100x64", "100x64"),
         ("--model run --out new.onnx --check-with text.so", "text.so"),

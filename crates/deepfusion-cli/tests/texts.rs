@@ -130,6 +130,18 @@ fn wrong_arguments_end_with_2_and_suggest_the_near_one() {
             "2, 3 or both",
         ),
         (
+            &["data", "export-gt", "d", "--out", "x.txt"],
+            "expected a name that ends in .npz",
+        ),
+        (
+            &["data", "export-gt", "d", "--out", "x"],
+            "expected a name that ends in .npz",
+        ),
+        (
+            &["export", "--out", "m.txt"],
+            "expected a name that ends in .onnx",
+        ),
+        (
             &[
                 "predict",
                 "--model",

@@ -647,3 +647,27 @@ fn each_of_two_cameras_is_a_view_of_the_other() {
     );
     assert!(!at.join("bag").exists());
 }
+
+#[test]
+fn both_cameras_of_a_drive_with_one_give_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let street = "simulate --frames 8 --seed 3 --scan-every 4 --size 192x64";
+    ok(at, &format!("{street} --out one"));
+    ok(at, &format!("{street} --stereo 0.5 --out two"));
+    let train = "train --size 96x64 --batch 2 --steps 1 --init none";
+    for (command, warnings) in [
+        (format!("{train} --data one --camera both --out run"), 1),
+        ("data export-gt one --camera both --out a.npz".into(), 1),
+        ("data export-gt one --out b.npz".into(), 0),
+        ("data export-gt two --camera both --out c.npz".into(), 0),
+    ] {
+        let printed = ok(at, &command).stderr;
+        let warning = "both cameras are asked for, but only camera 2 has images";
+        assert_eq!(
+            printed.matches(warning).count(),
+            warnings,
+            "{command}: {printed}"
+        );
+    }
+}

@@ -52,8 +52,8 @@ pub enum Error {
     File(#[from] FileError),
     /// The path exists, but is not a recording of a known layout.
     #[error(
-        "{}: not a recording of a known layout: {found}\nknown layouts:\n{LOOKED_FOR}",
-        path.display()
+        "{}: not a recording of a known layout: {found}{}",
+        path.display(), known_layouts(found)
     )]
     UnknownLayout {
         /// The path given.
@@ -569,16 +569,24 @@ pub enum Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// The known layouts, in the order in which they are looked for.
-const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/0000000000.png, here or up to two folders below
-  KITTI odometry     sequences/00/ with image_2/000000.png, calib.txt and times.txt, or such a sequence
-  KITTI-360          data_2d_raw/<drive>/image_00/data_rect/0000000000.png, or such a drive
-  nuScenes           v1.0-mini/ (or -trainval, -test) with sample_data.json, samples/CAM_FRONT beside it
-  comma2k19 segment  processed_log/CAN/speed/t or global_pose/frame_times
-  ROS bag            a file .bag, .mcap or .db3, or a folder with metadata.yaml, given or here
-  RGB-D folder       frame-000000.color.png or .jpg with .depth.png, here or in folders seq-01, …
-  video              a file .mp4, .mkv, .mov, .avi, .hevc, .m4v or .webm, given or the only one here
-  image folder       .png or .jpg files here, in images/, or where dataset.toml says";
+/// The known layouts, each with what it is recognised by.
+const KNOWN_LAYOUTS: &str = "\nknown layouts: image folder (.png or .jpg, here or in images/), video (.mp4, .mkv, .mov, .avi, .hevc, .m4v or .webm), \
+     ROS bag (.bag, .mcap or .db3), KITTI raw (image_02/), KITTI odometry (sequences/), KITTI-360 (data_2d_raw/), nuScenes (v1.0-mini/), \
+     comma2k19 (processed_log/), RGB-D (frame-000000.color.png)";
+
+/// The known layouts, on a line of their own, where what was found does not say what is wrong.
+fn known_layouts(found: &FoundInstead) -> &'static str {
+    match found {
+        FoundInstead::File | FoundInstead::Files { .. } | FoundInstead::Others { .. } => {
+            KNOWN_LAYOUTS
+        }
+        FoundInstead::PartOf { .. }
+        | FoundInstead::Ros2Bag
+        | FoundInstead::Image
+        | FoundInstead::Archive
+        | FoundInstead::Empty => "",
+    }
+}
 
 impl From<deepfusion_images::Error> for Error {
     fn from(error: deepfusion_images::Error) -> Self {
@@ -669,8 +677,8 @@ mod tests {
     #[test]
     fn every_video_extension_is_listed() {
         for ending in deepfusion_video::VIDEO_ENDINGS {
-            let named = LOOKED_FOR
-                .split([' ', ','])
+            let named = KNOWN_LAYOUTS
+                .split([' ', ',', '(', ')'])
                 .any(|word| word == format!(".{ending}"));
             assert!(named, "{ending}");
         }

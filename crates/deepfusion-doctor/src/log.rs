@@ -1,7 +1,7 @@
 //! A log of speeds on its own, before it is combined with a video: what it can be used for, what is missing, and what to do.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
-use super::reason::LogReason;
+use super::reason::{LogReason, MOST_MPS};
 use super::skip::LogSkip;
 use super::{Diagnosis, opening};
 use deepfusion_data::{Dataset, DatasetKind, Error as DataError};
@@ -18,8 +18,6 @@ const MOST_GAP_S: f64 = 3.5;
 const MOVING_MPS: f64 = 0.5;
 /// Least share of the time in which the vehicle should move, in percent.
 const LEAST_MOVING: f64 = 20.0;
-/// No road vehicle is faster, in m/s; km/h taken for m/s are.
-const MOST_MPS: f64 = 70.0;
 /// A distance's standard deviation at which its pair has half the weight in training, in percent.
 const MOST_SIGMA: f64 = 5.0;
 

@@ -17,6 +17,9 @@ pub use self::pictures::{ImageSide, PicturesReason};
 
 use serde::{Serialize, Serializer};
 
+/// No road vehicle is faster, in m/s; km/h taken for m/s are.
+pub(crate) const MOST_MPS: f64 = 70.0;
+
 /// Hint for a recording that cannot be opened, if there is no better one.
 const CORRECT: &str = "correct what the message names";
 

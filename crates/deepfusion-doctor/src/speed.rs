@@ -1,12 +1,12 @@
-//! The speeds compared with the road in the images, and with the recording's own poses.
+//! The speeds compared with the road in the images, with the recording's own poses, and with what a road vehicle can drive.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
-use super::reason::MotionReason;
+use super::reason::{MOST_MPS, MotionReason};
 use super::shared_error::SharedError;
 use super::skip::MotionSkip;
 use super::turning::turning_as_seen;
 use deepfusion_data::{
-    CameraPath, Dataset, DatasetKind, PLAUSIBLE_HEIGHT_M, SpeedWarning, road_camera_height,
+    CameraPath, Dataset, DatasetKind, Frame, PLAUSIBLE_HEIGHT_M, SpeedWarning, road_camera_height,
 };
 use deepfusion_geometry::Se3;
 
@@ -23,22 +23,49 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     let turning = turning_as_seen(dataset);
     by_road(turning.as_ref().unwrap_or(dataset), &mut outcome);
     by_poses(dataset, &mut outcome);
-    if outcome.measured.is_empty() && outcome.skipped.is_none() {
+    let nothing_shows = outcome.measured.is_empty() && outcome.skipped.is_none();
+    if nothing_shows {
         outcome.skipped = Some(MotionSkip::NoRoad.into());
-        if let Some(fastest_mps) = fastest_mps(dataset) {
+    }
+    match fastest(dataset) {
+        Some((time_s, speed_mps)) if speed_mps.abs() > MOST_MPS => {
+            too_fast(dataset, time_s, speed_mps, &mut outcome);
+        }
+        Some((_, speed_mps)) if nothing_shows => {
+            let fastest_mps = speed_mps.abs();
             let unchecked = MotionReason::Unchecked { fastest_mps };
             outcome.find(Severity::Note, None, unchecked);
         }
+        _ => {}
     }
     outcome
 }
 
-/// The highest speed at the time of a frame.
-fn fastest_mps(dataset: &Dataset) -> Option<f64> {
+/// The highest speed, forwards or backwards, from the first frame to the last, with its time: at a frame, or between two.
+fn fastest(dataset: &Dataset) -> Option<(f64, f64)> {
     let track = dataset.track()?;
-    let times = dataset.frames().iter().filter_map(|frame| frame.time_s);
-    let speeds = times.filter_map(|time_s| Some(track.speed_at(time_s)?.abs()));
-    speeds.max_by(f64::total_cmp)
+    let frames = dataset.frames().iter().filter_map(|frame| frame.time_s);
+    let first = frames.clone().reduce(f64::min)?;
+    let last = frames.clone().reduce(f64::max)?;
+    let samples = track.times_s().iter().copied();
+    let between = samples.filter(|time_s| (first..=last).contains(time_s));
+    let speeds = frames.chain(between).filter_map(|time_s| {
+        let speed_mps = track.speed_at(time_s)?;
+        Some((time_s, speed_mps))
+    });
+    speeds.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+}
+
+/// Reports a speed above the limit. One within it is no figure of this check, since it does not show that the speeds are right.
+fn too_fast(dataset: &Dataset, time_s: f64, speed_mps: f64, outcome: &mut Outcome) {
+    let limit = Limit::AtMost(MOST_MPS);
+    let figure = Figure::new("fastest", speed_mps.abs(), "m/s", limit);
+    let taken = |frame: &&Frame| frame.time_s.is_some_and(|taken_s| taken_s <= time_s);
+    let frame = dataset.frames().iter().rev().find(taken);
+    let number = frame.map(|frame| frame.number);
+    outcome.judge_at(Severity::Warning, number, figure, || {
+        MotionReason::TooFast { speed_mps, time_s }
+    });
 }
 
 fn by_road(dataset: &Dataset, outcome: &mut Outcome) {

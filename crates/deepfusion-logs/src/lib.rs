@@ -54,5 +54,5 @@ pub use problem::{
     BlfProblem, BytesProblem, CanFrameProblem, GpmfProblem, GpxProblem, LineField, LineProblem,
     Mp4Problem, NmeaProblem, SignalProblem, SpeedProblem, TableProblem,
 };
-pub use read::{is_gps_track, may_hold_log, read, read_all};
+pub use read::{is_can_trace, is_gps_track, may_hold_log, read, read_all};
 pub use units::{SpeedUnit, UnknownUnit};

@@ -20,6 +20,16 @@ pub fn may_hold_log(path: &Path) -> bool {
     ["mp4", "mov", "360", "lrv"].contains(&extension(path).as_str())
 }
 
+/// Whether a file is a CAN trace: only these need a DBC file. `false` for a file that cannot be read.
+#[must_use]
+pub fn is_can_trace(path: &Path) -> bool {
+    path.is_file()
+        && !may_hold_log(path)
+        && (extension(path) == "asc"
+            || can_trace::is_blf(path).is_ok_and(|is_blf| is_blf)
+            || text_of(path).is_ok_and(|text| can_trace::is_candump(first_line(&text))))
+}
+
 /// Reads several logs of one drive: the speeds of the first, with the turns of the first that has some. The columns named in the options
 /// must be in the first, and are used in the others if they have them. `zone_s`: how far the clocks of logs without a time zone are ahead
 /// of UTC, in seconds, if that is given. `None` for no log at all; else the log with the first one's own clock, as it was before it was
@@ -102,12 +112,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
         _ => {}
     }
     let text = text_of(path)?;
-    let first = text
-        .lines()
-        .find(|l| !l.trim().is_empty())
-        .unwrap_or("")
-        .trim();
-    let first = first.trim_start_matches('\u{feff}');
+    let first = first_line(&text);
     if first.starts_with('$') {
         receiver::read(path)
     } else if first.starts_with("<?xml") || first.starts_with("<gpx") {
@@ -124,6 +129,13 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
             wide_table::read(&table, options)
         }
     }
+}
+
+/// The first line that is not empty, without a byte order mark.
+fn first_line(text: &str) -> &str {
+    let mut lines = text.lines().map(str::trim);
+    let first = lines.find(|line| !line.is_empty()).unwrap_or("");
+    first.trim_start_matches('\u{feff}')
 }
 
 fn extension(path: &Path) -> String {

@@ -1,9 +1,11 @@
 //! What can go wrong when a vehicle's sensors are read and fused.
 
 mod array;
+mod dbc;
 mod expected;
 
 pub use self::array::{ArrayProblem, TimesArray};
+pub use self::dbc::DbcProblem;
 pub use self::expected::{ExpectedLayout, ExpectedSetting};
 
 use deepfusion_fs::FileError;
@@ -90,12 +92,12 @@ pub enum Error {
         problem: ArrayProblem,
     },
     /// A DBC file cannot be parsed.
-    #[error("DBC: {}{source}", of_file(path.as_deref()))]
+    #[error("DBC: {}{problem}", of_file(path.as_deref()))]
     Dbc {
         /// Path of the file; `None` for a text without a file.
         path: Option<PathBuf>,
-        /// The parser's error, with the line if known.
-        source: Box<can_dbc::DbcError>,
+        /// Why it cannot be parsed.
+        problem: DbcProblem,
     },
     /// A DBC file does not contain the signal.
     #[error("signal `{name}`: {problem}")]

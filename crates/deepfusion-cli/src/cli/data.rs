@@ -5,7 +5,7 @@ use deepfusion_data::{Cameras, GtKind, NamedTopic};
 use deepfusion_logs::SpeedUnit;
 use deepfusion_rosbag::Compression;
 
-use super::values::{ClockOffset, hfov};
+use super::values::{ClockOffset, file_ending_in, hfov};
 use super::{CameraIntrinsics, names};
 
 /// `deepfusion data …`.
@@ -225,7 +225,7 @@ pub(crate) struct ExportGtArgs {
     #[arg(long, value_name = "2|3|both", default_value = "2")]
     pub camera: Cameras,
     /// File to write.
-    #[arg(long, value_name = "FILE.npz")]
+    #[arg(long, value_name = "FILE.npz", value_parser = file_ending_in("npz"))]
     pub out: PathBuf,
     /// For bags: which topic to use for a role, if several match; may be repeated.
     ///

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::Size;
+use super::values::file_ending_in;
 
 /// `deepfusion export`.
 #[derive(Debug, Args)]
@@ -21,7 +22,7 @@ pub(crate) struct ExportArgs {
     #[arg(long = "data-set", alias = "set", value_name = "NAME")]
     pub set: Option<String>,
     /// File to write.
-    #[arg(long, value_name = "FILE.onnx")]
+    #[arg(long, value_name = "FILE.onnx", value_parser = file_ending_in("onnx"))]
     pub out: PathBuf,
     /// Size of the images that it takes [default: the training size].
     #[arg(long, value_name = "WxH")]

@@ -1,7 +1,9 @@
 //! Values of options that are more than a word or a number.
 
+use std::path::PathBuf;
 use std::str::FromStr;
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use deepfusion_eval::Scaling;
 use deepfusion_geometry::HFOV_DEG;
 pub(crate) use deepfusion_jobs::bulk::Shard;
@@ -151,6 +153,18 @@ pub(super) fn hfov(text: &str) -> Result<f64, String> {
         .ok_or_else(|| {
             format!("expected degrees above {least} and below {most}, such as 69; a wider lens needs a calibration file")
         })
+}
+
+/// A file to be written, whose name has the ending of its format: with another one it would be taken for something else.
+pub(super) fn file_ending_in(ending: &'static str) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(move |path| {
+        let own = path.extension().unwrap_or_default();
+        if own.eq_ignore_ascii_case(ending) {
+            Ok(path)
+        } else {
+            Err(format!("expected a name that ends in .{ending}"))
+        }
+    })
 }
 
 /// A number from 0 to 1.

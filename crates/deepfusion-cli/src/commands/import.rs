@@ -4,7 +4,8 @@ use std::path::Path;
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_hint::count_of;
 use deepfusion_logs::{
-    Camera, Clock, DriveFolder, LogNote, Media, ReadOptions, Speed, read_all, time_on_clock,
+    Camera, Clock, DriveFolder, LogNote, Media, ReadOptions, Speed, is_can_trace, read_all,
+    time_on_clock,
 };
 
 use super::{clocks, warnings};
@@ -32,6 +33,13 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
     let named = [&args.video, &args.images, &args.calibration];
     if let Some(path) = named.into_iter().flatten().find(|path| !path.exists()) {
         return Err(deepfusion_data::Error::file(path, ErrorKind::NotFound.into()).into());
+    }
+    if let (Some(_), Some(log)) = (&args.dbc, args.logs.first())
+        && log.exists()
+        && !args.logs.iter().any(|log| is_can_trace(log))
+    {
+        let path = log.clone();
+        return Err(CliError::NotACanTrace { path }.into());
     }
     let options = ReadOptions {
         time: args.time.clone(),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::failure::Result;
-use deepfusion_data::{Cameras, Dataset, OpenOptions};
+use deepfusion_data::{Camera, Cameras, Dataset, OpenOptions};
 use deepfusion_jobs::evaluation::{MissingReason, missing_frames};
 use deepfusion_jobs::recordings::{self, read_split};
 #[cfg(feature = "train")]
@@ -64,13 +64,27 @@ pub(super) fn warn_of_sample(warning: SampleWarning) {
     warnings::warn_once(warning.to_string());
 }
 
-/// Prints the recordings' warnings, and one if frames of the split are missing.
+/// Prints the recordings' warnings, and one if the second camera or frames of the split are missing.
 pub(super) fn print_warnings(options: &OpenOptions, datasets: &[Dataset]) {
     warnings::print(datasets);
+    if let Some(camera) = only_camera(options, datasets) {
+        warnings::warn_once(format!(
+            "both cameras are asked for, but only camera {} has images",
+            camera.number()
+        ));
+    }
     if let Some(missing) = missing_frames(options, datasets) {
         warnings::warn_once(match missing.why {
             MissingReason::OtherCamera(_) => format!("{missing}: add --camera both"),
             _ => missing.to_string(),
         });
     }
+}
+
+/// The camera of all images, if both cameras are asked for. A split may select the images of one.
+fn only_camera(options: &OpenOptions, datasets: &[Dataset]) -> Option<Camera> {
+    let first = datasets.first()?.camera();
+    let asked = options.camera == Cameras::Both && options.split.is_none();
+    let is_only = datasets.iter().all(|dataset| dataset.camera() == first);
+    (asked && is_only).then_some(first)
 }

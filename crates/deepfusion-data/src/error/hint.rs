@@ -15,11 +15,15 @@ impl Hint for Error {
                 found: FoundInstead::PartOf { drive },
                 ..
             } => return Some(format!("give the drive: {}", drive.display())),
+            Self::UnknownLayout {
+                found: FoundInstead::Empty,
+                ..
+            } => "give the folder or the file of a recording",
             Self::UnknownLayout { .. } => {
                 concat!(
                     "give the folder or the video file itself; the layouts are described in ",
                     env!("CARGO_PKG_REPOSITORY"),
-                    "/blob/main/docs/guides/train-on-your-own-video.md"
+                    "/blob/main/docs/reference/layouts.md"
                 )
             }
             Self::FolderOfRecordings { path, such_as, .. } => {
@@ -199,7 +203,7 @@ mod tests {
         let path = "x".into();
         let unknown = Error::UnknownLayout {
             path,
-            found: FoundInstead::Empty,
+            found: FoundInstead::File,
         };
         let hint = unknown.hint().unwrap();
         assert!(

@@ -15,6 +15,8 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 const TABLE: &str = "frames.csv";
+/// A header of that table.
+const HEADER: &str = "time_s,file";
 const LISTS: [&str; 2] = ["timestamps.txt", "times.txt"];
 
 /// An image with its number and its time on the recording's clock, in nanoseconds.
@@ -168,11 +170,8 @@ fn from_table(
     warnings: &mut Vec<DataWarning>,
 ) -> Result<(Vec<PathBuf>, Vec<Option<i64>>)> {
     let table = Table::read(path)?;
-    let ns = times(&table, config, warnings, TABLE)?;
-    let column = table.require(
-        &["file", "filename", "image", "name", "path"],
-        "time_s,file",
-    )?;
+    let ns = times(&table, config, warnings, TABLE, HEADER)?;
+    let column = table.require(&["file", "filename", "image", "name", "path"], HEADER)?;
     let by_name: HashMap<&str, &PathBuf> = images
         .iter()
         .filter_map(|p| Some((p.file_name()?.to_str()?, p)))

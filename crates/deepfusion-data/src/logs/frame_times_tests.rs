@@ -1,4 +1,5 @@
 use super::*;
+use deepfusion_hint::Hint;
 
 fn images(names: &[&str]) -> Vec<PathBuf> {
     names
@@ -175,4 +176,12 @@ fn invalid_lists_and_tables_are_errors() {
         let error = timed(&["a", "b"], &[(file, text)]).unwrap_err().to_string();
         assert!(error.contains(problem), "{error}");
     }
+}
+
+#[test]
+fn a_table_without_a_header_gets_an_example_of_its_own() {
+    let error = timed(&["a", "b"], &[("frames.csv", "0.0,a.png\n0.1,b.png\n")]).unwrap_err();
+    assert!(error.to_string().contains("no column 'time'"), "{error}");
+    let hint = error.hint().unwrap();
+    assert!(hint.ends_with("such as time_s,file"), "{hint}");
 }

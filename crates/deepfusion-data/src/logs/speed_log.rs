@@ -15,6 +15,10 @@ use deepfusion_logs::{Clock, DriveLog, ReadOptions, YawRate, is_gps_track};
 use deepfusion_motion::{ImuMount, Signal};
 use std::path::{Path, PathBuf};
 
+/// A header of each table.
+const SPEED_HEADER: &str = "time_s,speed_mps";
+const IMU_HEADER: &str = "time_s,gyro_z_radps";
+const COURSE_HEADER: &str = "time_s,course_rate_radps";
 const SPEEDS: [&str; 4] = ["speed", "velocity", "vehicle_speed", "v"];
 const SIGMAS: [&str; 3] = ["speed_sigma", "speed_accuracy", "speed_std"];
 /// Longest gaps across which a receiver's turns and its standard deviations are interpolated, in seconds.
@@ -71,8 +75,8 @@ impl SpeedLog {
         let (mut course_rates_radps, mut sigmas_mps) = (None, None);
         let (measured, table) = match own_or_foreign(&path, config)? {
             LogFile::Own(table) => {
-                let ns = times(&table, config, &mut warnings, &name(&path))?;
-                let column = table.require(&SPEEDS, "time_s,speed_mps")?;
+                let ns = times(&table, config, &mut warnings, &name(&path), SPEED_HEADER)?;
+                let column = table.require(&SPEEDS, SPEED_HEADER)?;
                 let factor = speed_factor(&table, column, config)? * config.speed_scale();
                 let values = scaled(table.numbers(column)?, factor);
                 if let Some(column) = table.column(&SIGMAS) {
@@ -106,7 +110,7 @@ impl SpeedLog {
             yaw_rates_radps = Some(yaw_rates.bridged(config.max_gap_s, None));
         } else if let Some(imu) = imu {
             let table = Table::read(&imu)?;
-            let ns = times(&table, config, &mut warnings, &name(&imu))?;
+            let ns = times(&table, config, &mut warnings, &name(&imu), IMU_HEADER)?;
             streams.push(stream(&imu, "imu", &ns));
             let readings = imu_readings(&table, &ns, |column| yaw_factor(&table, column, config))?;
             if let Some(imu) = readings {
@@ -116,7 +120,7 @@ impl SpeedLog {
                     config: config.motion(ImuMount::default()),
                 });
             } else {
-                let column = table.require(&YAW_RATES, "time_s,gyro_z_radps")?;
+                let column = table.require(&YAW_RATES, IMU_HEADER)?;
                 let factor = yaw_factor(&table, column, config)?;
                 let values = scaled(table.numbers(column)?, factor);
                 yaw_rates_radps = Some(Samples { ns, values }.bridged(config.max_gap_s, None));
@@ -334,8 +338,8 @@ fn course_table(
         }
         Err(error) => return Err(error),
     };
-    let ns = times(&table, config, warnings, &name(&path))?;
-    let column = table.require(&COURSE_RATES, "time_s,course_rate_radps")?;
+    let ns = times(&table, config, warnings, &name(&path), COURSE_HEADER)?;
+    let column = table.require(&COURSE_RATES, COURSE_HEADER)?;
     let factor = yaw_factor(&table, column, config)?;
     let values = scaled(table.numbers(column)?, factor);
     Ok(Some(Samples { ns, values }))

@@ -66,14 +66,15 @@ fn style_of(
     })
 }
 
-/// The table's times in nanoseconds, which must increase; repeated times give a warning.
+/// The table's times in nanoseconds, which must increase; repeated times give a warning. `example`: a header that such a table may have.
 pub(crate) fn times(
     table: &Table,
     config: &FolderConfig,
     warnings: &mut Vec<DataWarning>,
     name: &str,
+    example: &'static str,
 ) -> Result<Vec<i64>> {
-    let column = table.require(&TIMES, "time_s,speed_mps")?;
+    let column = table.require(&TIMES, example)?;
     if table.len() == 0 {
         return Err(table.lacks(ColumnsProblem::NoRows));
     }

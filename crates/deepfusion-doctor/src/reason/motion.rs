@@ -19,6 +19,17 @@ pub enum MotionReason {
         /// The highest speed, m/s.
         fastest_mps: f64,
     },
+    /// A speed is higher than a road vehicle's.
+    #[error(
+        "at {time_s:.2} s the speed is {speed_mps:.0} m/s ({:.0} km/h), more than any road vehicle's: its unit or the value is wrong, and depths would be wrong by the same factor",
+        3.6 * speed_mps
+    )]
+    TooFast {
+        /// The speed, m/s; negative backwards.
+        speed_mps: f64,
+        /// Its time on the frames' clock, seconds.
+        time_s: f64,
+    },
     /// The recording's own poses contradict its speeds.
     #[error(
         "the poses cover {by_poses_m:.0} m, the speeds {by_speeds_m:.0} m: depths would come out {depth_factor:.2} times as large"
@@ -145,6 +156,9 @@ impl MotionReason {
             Self::Unchecked { .. } => {
                 "check that it was that fast; with a wrong unit (km/h taken for m/s) every depth would be wrong by the same factor"
             }
+            Self::TooFast { .. } => {
+                "check the speed's unit (in tables: name the column speed_kmh or speed_mph, or set speed_unit in dataset.toml), and delete single wrong values"
+            }
             Self::Poses { .. } => {
                 "check the speed signal's unit and factor (3.6 for km/h, 1.02 for a worn tyre)"
             }
@@ -206,6 +220,13 @@ mod tests {
             (
                 MotionReason::Unchecked { fastest_mps: 50.04 },
                 "neither road nor poses show whether the speeds are right: according to them, the vehicle drives at up to 50.0 m/s (180 km/h)",
+            ),
+            (
+                MotionReason::TooFast {
+                    speed_mps: -500.0,
+                    time_s: 0.504,
+                },
+                "at 0.50 s the speed is -500 m/s (-1800 km/h), more than any road vehicle's: its unit or the value is wrong, and depths would be wrong by the same factor",
             ),
             (
                 MotionReason::Poses {

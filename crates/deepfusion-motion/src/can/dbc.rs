@@ -31,9 +31,9 @@ impl Dbc {
     fn of_text(text: &str, path: Option<&Path>) -> Result<Self> {
         can_dbc::Dbc::try_from(text)
             .map(Self)
-            .map_err(|source| Error::Dbc {
+            .map_err(|error| Error::Dbc {
                 path: path.map(Path::to_owned),
-                source: Box::new(source),
+                problem: error.into(),
             })
     }
 

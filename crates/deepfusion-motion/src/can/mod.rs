@@ -7,7 +7,7 @@ mod dbc;
 mod layout;
 mod signal;
 
-pub use crate::error::{ExpectedLayout, SignalProblem};
+pub use crate::error::{DbcProblem, ExpectedLayout, SignalProblem};
 pub use dbc::Dbc;
 pub use layout::{BitLayout, ByteOrder, Number};
 pub use signal::{CanFrame, CanId, CanSignal, MultiplexCondition};

@@ -12,7 +12,7 @@ use std::path::Path;
 use deepfusion_data::{DatasetKind, OpenOptions};
 use deepfusion_doctor::{Diagnosis, Severity, doctor_log, doctor_with, is_log};
 use deepfusion_hint::count_of;
-use deepfusion_logs::ReadOptions;
+use deepfusion_logs::{ReadOptions, is_can_trace};
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
 use crate::commands::{clocks, warnings};
@@ -100,6 +100,10 @@ fn out_of_place(is_log: bool, args: &DoctorArgs) -> Option<&'static str> {
 
 /// A log of speeds by itself.
 fn log(path: &Path, args: &DoctorArgs) -> Result<()> {
+    if args.dbc.is_some() && !is_can_trace(path) {
+        let path = path.to_owned();
+        return Err(CliError::NotACanTrace { path }.into());
+    }
     let options = ReadOptions {
         time: args.time.clone(),
         speed: args.speed.clone(),

@@ -12,7 +12,7 @@ use deepfusion_jobs::{Input, TargetFinder, TargetSettings, perception_settings};
 use deepfusion_perception::PerceptionConfig;
 
 use super::live as sources;
-use super::predict::{check_watched, find_inputs, job};
+use super::predict::{check_topics, check_watched, find_inputs, job};
 use crate::cli::PerceiveArgs;
 use crate::error::CliError;
 use crate::failure::{Failure, Result};
@@ -31,6 +31,7 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
         (None, Some(_)) => return Err(CliError::OnlyLive { option: "--speed" }.into()),
         (None, None) => find_inputs(prediction, &model)?,
     };
+    check_topics(prediction, &all)?;
     check_watched(prediction, source.as_ref(), &all)?;
     let mut config = perception_settings(args.config.as_deref(), PerceptionConfig::predicted())?;
     if let Some(far) = args.max_depth {

@@ -7,7 +7,7 @@ use deepfusion_records::Sidecar;
 use deepfusion_runtime::ModelSource;
 use deepfusion_video::Address;
 
-use super::{check_watched, job, print_videos};
+use super::{check_topics, check_watched, job, print_videos};
 use crate::cli::{PredictArgs, Shard};
 use crate::commands::live::{open, warn_of_end};
 use crate::error::CliError;
@@ -21,6 +21,7 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     if args.shard != Shard::WHOLE {
         return Err(CliError::LiveShard.into());
     }
+    check_topics(prediction, &[])?;
     check_watched(prediction, Some(address), &[])?;
     let mut estimator = engine::load(model, &prediction.engine)?;
     // The images exist nowhere else, and depth is of little use without them.

@@ -40,6 +40,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
         return live::run(args, &model, &address);
     }
     let all = find_inputs(prediction, &model)?;
+    check_topics(prediction, &all)?;
     check_watched(prediction, None, &all)?;
     if prediction.correct_scale && *shard != Shard::WHOLE {
         return Err(CliError::CorrectShard.into());
@@ -153,6 +154,23 @@ pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<
         Some(most) => first_of_each(found, usize::try_from(most).unwrap_or(usize::MAX)),
         None => found,
     })
+}
+
+/// Refuses topics for inputs without a recording among them, where they would silently have no effect. Other recordings than bags refuse
+/// them when they are opened.
+///
+/// # Errors
+/// [`CliError::NoTopics`].
+pub(super) fn check_topics(args: &PredictionArgs, inputs: &[Input]) -> Result<(), CliError> {
+    match args.topics.first() {
+        Some(topic) if inputs.iter().all(|input| input.frame.is_none()) => {
+            Err(CliError::NoTopics {
+                input: args.inputs.join(" "),
+                topic: topic.clone(),
+            })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Refuses the scale monitor's options for inputs that it cannot monitor, where they would silently have no effect.
