@@ -75,7 +75,7 @@ fn is_the_drive(dataset: &Dataset, known: &DriveFacts) {
         &[
             "/gnss/fix: 1 of 10 messages left out for lack of a position",
             "median standard deviation of 0.",
-            "bridged",
+            "interpolated linearly across 8 gaps",
         ],
     );
 }
