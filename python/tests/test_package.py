@@ -496,7 +496,7 @@ def test_errors_say_what_to_do(drive, model, tmp_path):
             model.predict(wrong)
     with pytest.raises(ValueError, match="crop"):
         deepfusion.evaluate([np.ones((4, 4))], [np.ones((4, 4))], crop="eigen")
-    with pytest.raises(ValueError, match="found 1"):
+    with pytest.raises(ValueError, match="predictions: expected 0"):
         deepfusion.evaluate([np.ones((4, 4))], [])
     (tmp_path / "broken.png").write_bytes(b"no picture")
     with pytest.raises(deepfusion.DeepFusionError, match="broken.png"):

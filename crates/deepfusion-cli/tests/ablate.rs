@@ -135,4 +135,9 @@ fn an_impossible_table_is_refused() {
         }
         assert!(!run.stderr.contains("panicked"), "{args}: {}", run.stderr);
     }
+    let both = "ablate --data sim --budget 1 --with affine --without moving,affine --out g";
+    let both = run(at, both);
+    assert_eq!(both.code, 2, "{}", both.stderr);
+    assert!(both.stderr.contains("--without affine"), "{}", both.stderr);
+    assert!(!at.join("g").exists());
 }

@@ -158,6 +158,11 @@ fn wrong_arguments_end_with_2_and_suggest_the_near_one() {
             &["predict", "i.png", "--out", "o", "--max-depth", "-1"],
             "above 0",
         ),
+        (&["simulate", "--out", "x", "--stereo", "-1"], "above 0"),
+        (
+            &["simulate", "--out", "x", "--camera-height", "-1.5"],
+            "above 0",
+        ),
         (&["calibrate", "b.mp4", "--board", "9"], "such as 9x6"),
         (&["data", "inspect", "d", "--hfov", "180"], "below 170"),
         (

@@ -71,7 +71,7 @@ fn a_segment_without_its_video_is_inspected_but_not_opened() {
     assert!(
         error
             .to_string()
-            .contains("video.hevc: no such file or folder")
+            .contains("video.hevc: no such file or folder; it should contain")
     );
     assert!(error.hint().unwrap().contains("fetch video.hevc"));
 }

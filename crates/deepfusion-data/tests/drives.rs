@@ -295,7 +295,7 @@ fn errors_name_a_missing_or_bad_calibration() {
     fs::remove_file(&file).unwrap();
     let refused = refusal(&drive);
     assert!(
-        refused.contains("calib_cam_to_cam.txt: no such file or folder"),
+        refused.contains("calib_cam_to_cam.txt: no such file or folder; it should contain"),
         "{refused}"
     );
 }

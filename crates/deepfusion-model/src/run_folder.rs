@@ -192,7 +192,7 @@ impl RunFolder {
     /// The run's findings from its data.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::ConfigFile`].
+    /// [`Error::NoSuchFile`], [`Error::Io`], [`Error::ConfigFile`].
     pub fn read_findings(&self) -> Result<TrainFindings, Error> {
         let path = self.config_path();
         let text = std::fs::read_to_string(&path).map_err(|e| Error::io(&path, "read", e))?;

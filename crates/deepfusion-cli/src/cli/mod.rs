@@ -212,10 +212,10 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_parser = names::sensors())]
     pub sensors: Option<Sensors>,
     /// Height of the camera above the road, in metres [default: 1.65].
-    #[arg(long, value_name = "M", value_parser = values::positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "M", value_parser = values::positive)]
     pub camera_height: Option<f64>,
     /// Also write the images of a second camera, this far to the right of the first one, in metres (KITTI's: 0.53).
-    #[arg(long, value_name = "M", value_parser = values::positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "M", value_parser = values::positive)]
     pub stereo: Option<f64>,
     /// Set the clock of camera and LiDAR this many milliseconds ahead of the vehicle's (bags only).
     #[arg(

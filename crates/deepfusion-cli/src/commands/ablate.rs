@@ -74,6 +74,7 @@ pub(super) fn run(args: &AblateArgs) -> Result<()> {
 }
 
 fn request(args: &AblateArgs) -> Result<PlanRequest> {
+    train::check_terms(&args.with, &args.without)?;
     let file = match &args.config {
         Some(path) => Some(TrainConfig::read_over_preset(path, args.device.compute())?),
         None => None,

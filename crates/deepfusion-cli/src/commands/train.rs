@@ -174,11 +174,17 @@ fn warn_of_mean(file: &Path, config: &TrainConfig, args: &TrainArgs) {
     }
 }
 
-fn request(args: &TrainArgs) -> Result<StartRequest> {
-    if let Some(term) = args.with.iter().find(|term| args.without.contains(term)) {
+/// Refuses a term that is both switched on and left out.
+pub(super) fn check_terms(with: &[String], without: &[String]) -> Result<()> {
+    if let Some(term) = with.iter().find(|term| without.contains(term)) {
         let term = term.clone();
         return Err(CliError::OnAndOff { term }.into());
     }
+    Ok(())
+}
+
+fn request(args: &TrainArgs) -> Result<StartRequest> {
+    check_terms(&args.with, &args.without)?;
     let file = match &args.config {
         Some(path) => {
             let config = TrainConfig::read_over_preset(path, args.device.compute())?;

@@ -47,7 +47,7 @@ impl CalibrationReport<'_> {
             .collect();
         let header = ["View", "used", "error, px", "distance, m", "tilt, degrees"];
         page = page.section("Views").table(&header, &rows);
-        Ok(page.section("Again").command(command))
+        Ok(page.section("Reproduce").command(command))
     }
 
     /// The image's area, with a dot for each corner.

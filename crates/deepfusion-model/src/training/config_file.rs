@@ -16,7 +16,7 @@ impl TrainConfig {
     /// A file that names every key ignores its preset: optional keys that it leaves out are absent.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::ConfigFile`] naming the line or the key, and those of [`Self::validate`].
+    /// [`Error::NoSuchFile`], [`Error::Io`], [`Error::ConfigFile`] naming the line or the key, and those of [`Self::validate`].
     pub fn read_over_preset(path: &Path, compute: Compute) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
         let wrong = |e: toml::de::Error| Error::ConfigFile {

@@ -70,7 +70,7 @@ impl TrainFindings {
     /// The findings in a configuration file, whether or not it names every key; empty if the file is not a run's.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::ConfigFile`].
+    /// [`Error::NoSuchFile`], [`Error::Io`], [`Error::ConfigFile`].
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
         let wrong = |e: toml::de::Error| Error::ConfigFile {

@@ -347,7 +347,7 @@ impl TrainConfig {
     /// Reads a TOML file. From a run's file it reads the settings, not the findings ([`crate::RunFolder::read_findings`]).
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::ConfigFile`] naming the line, and those of [`Self::validate`].
+    /// [`Error::NoSuchFile`], [`Error::Io`], [`Error::ConfigFile`] naming the line, and those of [`Self::validate`].
     pub fn read(path: &std::path::Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
         let (config, _) = Self::from_run_text(&text).map_err(|e| Error::ConfigFile {

@@ -27,7 +27,7 @@ impl FileKind {
     /// protocol). A safetensors file starts with the length of its JSON header, whose first byte is at offset 8.
     ///
     /// # Errors
-    /// [`NetworkError::Io`] for a file that cannot be read, [`NetworkError::Format`] for one of neither format.
+    /// [`NetworkError::NoSuchFile`] or [`NetworkError::Io`] for a file that cannot be read, [`NetworkError::Format`] for one of neither format.
     pub fn of(path: &Path) -> Result<Self, NetworkError> {
         let mut start = [0_u8; 9];
         let mut file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
@@ -58,7 +58,8 @@ impl FileKind {
 /// Reads every float tensor of a safetensors file. f64, f16 and bf16 become f32; integers are skipped.
 ///
 /// # Errors
-/// [`NetworkError::Io`] for a file that cannot be read, [`NetworkError::Format`] for one that is not a safetensors file.
+/// [`NetworkError::NoSuchFile`] or [`NetworkError::Io`] for a file that cannot be read, [`NetworkError::Format`] for one that is not a
+/// safetensors file.
 pub fn read_safetensors(path: &Path) -> Result<Weights, NetworkError> {
     read_safetensors_under(path, "")
 }

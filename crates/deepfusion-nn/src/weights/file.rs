@@ -17,7 +17,7 @@ const NESTED: &str = "state_dict.";
 /// beside other entries, as training programs save it, only the `state_dict` is read.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it has no weights.
+/// [`Error::NoSuchFile`] or [`Error::Io`] if the file cannot be read, [`Error::Format`] if it has no weights.
 pub fn read(path: &Path) -> Result<Weights, Error> {
     let weights = match FileKind::of(path)? {
         FileKind::Safetensors => read_safetensors(path)?,
