@@ -16,7 +16,7 @@ pub enum Mp4Problem {
     #[error("it ends early")]
     Cut,
     /// A box is longer than the one that contains it.
-    #[error("{name}: size {}, but only {left} are left", count_of(*size, "byte"))]
+    #[error("{name}: size {}, but only {left} left", count_of(*size, "byte"))]
     Size {
         /// Name of the box.
         name: String,
@@ -44,7 +44,7 @@ pub enum Mp4Problem {
 #[non_exhaustive]
 pub enum GpmfProblem {
     /// An entry is longer than the data that contains it.
-    #[error("{key}: length {}, but only {left} are left", count_of(*length, "byte"))]
+    #[error("{key}: length {}, but only {left} left", count_of(*length, "byte"))]
     Length {
         /// Key of the entry.
         key: String,
