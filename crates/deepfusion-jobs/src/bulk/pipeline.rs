@@ -73,7 +73,7 @@ pub fn run<P: Send, O: Send>(
         // The threads of the last stage hold clones; their loops end when `to_after` is dropped.
         drop(computed);
         for item in 0..items {
-            // A thread that ends early was told to stop.
+            // A thread that ends early was asked to stop.
             let Ok(made) = prepared[item % makers].recv() else {
                 break;
             };

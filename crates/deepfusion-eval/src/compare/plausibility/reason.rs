@@ -115,7 +115,7 @@ pub enum FlagReason {
     /// The camera was unknown, so that distances of points are along the z axis only.
     #[error("distances along z: the camera is unknown")]
     AlongZ,
-    /// A remark of the table of published figures on its row.
+    /// A note in the table of published figures on its row.
     #[error("{0}")]
     Published(String),
 }
