@@ -67,13 +67,13 @@ def train(
         raise ValueError(f"device: expected {device.partition(':')[0]!r}, since Ray assigns the GPUs, found {device!r}")
     if device != "cpu" and not use_gpu:
         raise ValueError(f"device: {device!r} needs use_gpu=True, which gives each worker a GPU")
-    from ray.train import FailureConfig, RunConfig, ScalingConfig
-    from ray.train.torch import TorchConfig, TorchTrainer
-
     folder = Path(out).absolute()
     # Checked here, so that it is one immediate error and not one in each worker.
     if not (folder / _LAST).exists():
         _check_begun(folder)
+    from ray.train import FailureConfig, RunConfig, ScalingConfig
+    from ray.train.torch import TorchConfig, TorchTrainer
+
     folder.parent.mkdir(parents=True, exist_ok=True)
     arguments = {
         "config": config if isinstance(config, str) else dict(config),
