@@ -121,7 +121,7 @@ pub fn array_places(arrays: &ArraySet, datasets: &[Dataset]) -> Result<HashMap<S
     Ok(frames.into_iter().map(|(_, name)| name).zip(0..).collect())
 }
 
-/// Pixels of the network's output, by their index in [`Prediction::disparity`], with their true depth in metres: up to [`PIXELS`], evenly
+/// Pixels of the network's output, by their index in [`Prediction::disparity`], with their true depth in metres: up to 4,000, evenly
 /// chosen among the pixels of the ground truth within the range. Both the ground truth and the prediction cover the whole image.
 #[must_use]
 pub fn known_pixels(truth: &Grid, seen: &Prediction, range_m: &Range<f64>) -> Vec<(usize, f64)> {
