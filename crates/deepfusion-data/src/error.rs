@@ -53,7 +53,7 @@ pub enum Error {
     /// The path exists, but is not a recording of a known layout.
     #[error(
         "{}: not a recording of a known layout: {found}{}",
-        path.display(), known_layouts(found)
+        path.display(), found.known_layouts()
     )]
     UnknownLayout {
         /// The path given.
@@ -569,25 +569,6 @@ pub enum Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// The known layouts, each with what it is recognised by.
-const KNOWN_LAYOUTS: &str = "\nknown layouts: image folder (.png or .jpg, here or in images/), video (.mp4, .mkv, .mov, .avi, .hevc, .m4v or .webm), \
-     ROS bag (.bag, .mcap or .db3), KITTI raw (image_02/), KITTI odometry (sequences/), KITTI-360 (data_2d_raw/), nuScenes (v1.0-mini/), \
-     comma2k19 (processed_log/), RGB-D (frame-000000.color.png)";
-
-/// The known layouts, on a line of their own, where what was found does not say what is wrong.
-fn known_layouts(found: &FoundInstead) -> &'static str {
-    match found {
-        FoundInstead::File | FoundInstead::Files { .. } | FoundInstead::Others { .. } => {
-            KNOWN_LAYOUTS
-        }
-        FoundInstead::PartOf { .. }
-        | FoundInstead::Ros2Bag
-        | FoundInstead::Image
-        | FoundInstead::Archive
-        | FoundInstead::Empty => "",
-    }
-}
-
 impl From<deepfusion_images::Error> for Error {
     fn from(error: deepfusion_images::Error) -> Self {
         use deepfusion_images::Error as Images;
@@ -672,16 +653,6 @@ mod tests {
         out.write_all(b"x").unwrap();
         let error = Error::file(Path::new("depth.npz"), out.flush().unwrap_err());
         assert!(error.hint().unwrap().contains("full"), "{error}");
-    }
-
-    #[test]
-    fn every_video_extension_is_listed() {
-        for ending in deepfusion_video::VIDEO_ENDINGS {
-            let named = KNOWN_LAYOUTS
-                .split([' ', ',', '(', ')'])
-                .any(|word| word == format!(".{ending}"));
-            assert!(named, "{ending}");
-        }
     }
 
     #[test]

@@ -6,7 +6,11 @@ use crate::note::{ClockNote, LogNote};
 use crate::rows::text_of;
 use crate::table::Table;
 use crate::{can_trace, export_folder, gnss_logger, gpmf, gpx, receiver, tall_table, wide_table};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
+
+/// Bytes of a file that show whether its first line is one of candump's.
+const BEGINNING: u64 = 4096;
 
 /// Whether a file is named like a GPS track: `.gpx` or `.nmea`.
 #[must_use]
@@ -26,8 +30,17 @@ pub fn is_can_trace(path: &Path) -> bool {
     path.is_file()
         && !may_hold_log(path)
         && (extension(path) == "asc"
-            || can_trace::is_blf(path).is_ok_and(|is_blf| is_blf)
-            || text_of(path).is_ok_and(|text| can_trace::is_candump(first_line(&text))))
+            || can_trace::is_blf(path).unwrap_or(false)
+            || begins_as_candump(path).unwrap_or(false))
+}
+
+/// Whether the first line of a file is one of candump's. Only the beginning is read, as a trace may have gigabytes.
+fn begins_as_candump(path: &Path) -> std::io::Result<bool> {
+    let mut beginning = Vec::new();
+    let file = std::fs::File::open(path)?;
+    file.take(BEGINNING).read_to_end(&mut beginning)?;
+    let text = String::from_utf8_lossy(&beginning);
+    Ok(can_trace::is_candump(first_line(&text)))
 }
 
 /// Reads several logs of one drive: the speeds of the first, with the turns of the first that has some. The columns named in the options

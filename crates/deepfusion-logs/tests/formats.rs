@@ -2,7 +2,7 @@
 
 use deepfusion_logs::{
     Clock, ClockNote, DriveLog, Format, GoproLens, LogNote, ReadOptions, SpeedUnit, TableNote,
-    TurnSign, TurnsNote, read, read_all,
+    TurnSign, TurnsNote, is_can_trace, read, read_all,
 };
 use std::path::{Path, PathBuf};
 
@@ -307,6 +307,22 @@ fn turns_without_a_zone_are_taken_as_utc_with_a_note() {
     let in_zone = read(Some(7200));
     assert!(!in_zone.notes.contains(&expected));
     assert_eq!(in_zone.yaw_rates[0].ns, NOON_NS);
+}
+
+#[test]
+fn can_traces_are_distinguished_from_other_logs() {
+    for name in ["candump.log", "vector.asc", "vector.blf"] {
+        assert!(is_can_trace(&fixture(name)), "{name}");
+    }
+    for name in [
+        "torque.csv",
+        "phone.gpx",
+        "gopro.mp4",
+        "vehicle.dbc",
+        "absent.log",
+    ] {
+        assert!(!is_can_trace(&fixture(name)), "{name}");
+    }
 }
 
 #[test]

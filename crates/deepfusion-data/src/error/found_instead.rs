@@ -5,6 +5,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
+/// The known layouts, each with what it is recognised by.
+const KNOWN_LAYOUTS: &str = "\nknown layouts: image folder (.png or .jpg, here or in images/), video (.mp4, .mkv, .mov, .avi, .hevc, .m4v or .webm), \
+     ROS bag (.bag, .mcap or .db3), KITTI raw (image_02/), KITTI odometry (sequences/), KITTI-360 (data_2d_raw/), nuScenes (v1.0-mini/), \
+     comma2k19 (processed_log/), RGB-D (frame-000000.color.png)";
+
 /// What was found at a path without a recording of a known layout.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -83,6 +88,16 @@ impl FoundInstead {
     }
 }
 
+impl FoundInstead {
+    /// The known layouts, on a line of their own, where what was found does not say what is wrong.
+    pub(super) fn known_layouts(&self) -> &'static str {
+        match self {
+            Self::File | Self::Files { .. } | Self::Others { .. } => KNOWN_LAYOUTS,
+            Self::PartOf { .. } | Self::Ros2Bag | Self::Image | Self::Archive | Self::Empty => "",
+        }
+    }
+}
+
 impl fmt::Display for FoundInstead {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -120,5 +135,20 @@ impl fmt::Display for FoundInstead {
             )?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_video_extension_is_listed() {
+        for ending in deepfusion_video::VIDEO_ENDINGS {
+            let named = KNOWN_LAYOUTS
+                .split([' ', ',', '(', ')'])
+                .any(|word| word == format!(".{ending}"));
+            assert!(named, "{ending}");
+        }
     }
 }
